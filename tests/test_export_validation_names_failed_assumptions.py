@@ -11,7 +11,7 @@ import pytest
 from design_case import example_dictionary, vessel
 from expdesign.estimation.methods import METHODS
 from expdesign.export import estimate_page
-from expdesign.export.validation_page import ValidationContent, biased, judgements, off_theory, surely_biased
+from expdesign.export.validation_page import biased, judgements, off_theory, surely_biased
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Sensors, Vessel
@@ -64,8 +64,7 @@ def told(plan: Rehearsal, *, spread: float, noisy: tuple[str, ...] = ()) -> str:
         theory=np.ones(p),
         failed=0,
     )
-    content = ValidationContent(scenario="any", rehearsal=plan, results=(result,), noisy_moduli=noisy)
-    return " ".join(judgements(content))
+    return " ".join(judgements(plan, (result,), noisy_moduli=noisy))
 
 
 def test_where_predictions_hold_no_assumption_is_blamed():
@@ -146,8 +145,7 @@ def test_wind_that_the_method_does_not_know_is_found_and_named():
         integrator="euler",
         trials=12,
     )
-    content = ValidationContent(scenario="any", rehearsal=plan, results=validate(plan), noisy_moduli=())
-    said = " ".join(judgements(content))
+    said = " ".join(judgements(plan, validate(plan), noisy_moduli=()))
     assert "the bias exceeds half a standard deviation" in said
     assert "no current and wind. Method iv removes only a constant" in said
 

@@ -13,10 +13,9 @@ from design_case import SCENARIOS
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import InputError
 from expdesign.export.foresight_page import (
-    OperationContent,
     operation_document,
     operation_json,
-    operation_rows,
+    operation_row,
     operation_sentences,
 )
 from expdesign.export.pages import document_html
@@ -101,12 +100,12 @@ def test_intervals_are_exact(count: int, trials: int) -> None:
 
 def test_page_file_and_table_agree() -> None:
     found = foresee_operation(CASE.vessel, WEATHER, voyages=1, hours=0.2, sizes=(0.2,), references=1, seed=4)
-    content = OperationContent(scenario="story", vessel="tender", found=found)
-    told, page = json.loads(operation_json(content)), document_html(operation_document(content))
+    told = json.loads(operation_json(found, vessel="tender"))
+    page = document_html(operation_document(found, scenario="story", vessel="tender"))
     assert [row["found"] for row in told["changes"]] == [item.found for item in found.rows]
     assert f"Of {found.nominal} voyage of" in told["sentences"][0]
-    for row in operation_rows(found):
-        assert row[0] in page
+    for item in found.rows:
+        assert operation_row(item)[0] in page
     assert all(text.endswith(".") for text in operation_sentences(found))
 
 

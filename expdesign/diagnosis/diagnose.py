@@ -159,7 +159,7 @@ def select_causes(
     searched, compared = kept, None
     reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
     dropped = {step.chosen.candidate.cause for step in found.steps} if not kept.steps else set()
-    little = explains_little(reached, windows) or _imitates(kept)
+    little = explains_little(reached, windows) or any(step.chosen.candidate.imitates for step in kept.steps)
     if dropped or little:
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
         compared = compare_predictions(begun, short, seed, progress, () if little else dropped)
@@ -189,11 +189,6 @@ def select_causes(
         replaced=() if compared is None else searched.steps,
         suspected=first,
     )
-
-
-def _imitates(kept: Selection) -> bool:
-    """Whether a cause may imitate others."""
-    return any(step.chosen.candidate.imitates for step in kept.steps)
 
 
 def explains_little(after: Accuracy, windows: Windows) -> bool:

@@ -260,7 +260,7 @@ def _estimate(
         refinements=refined.refinements,
         warnings=(
             *layout.notes,
-            *_row_notes(rows),
+            *([f"{rows.left_out} samples with missing values are not used."] if rows.left_out else []),
             *sample_notes(residuals),
             *refined.warnings,
             *solution.warnings,
@@ -291,10 +291,6 @@ def _statistics(regression: Regression, solution: Solution, left_out: int) -> Re
         left_out=left_out,
         lags=solution.lags,
     )
-
-
-def _row_notes(rows: Rows) -> Sequence[str]:
-    return [f"{rows.left_out} samples with missing values are not used."] if rows.left_out else []
 
 
 def faint_notes(found: NullSpace) -> Sequence[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -36,34 +35,19 @@ from expdesign.export.files import (
     steered_entry,
     unstable_warning,
 )
-from expdesign.vessel import NOT_ACTING_BACK, Vessel
+from expdesign.vessel import NOT_ACTING_BACK, Vessel, VesselModel
 
 FAST_DECAY = 1e-3  # growth of an initial error below which the table says that it decays
 DRAWN_METHODS = 3  # largest number of methods in the figures of runs
 STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EstimateContent:
-    """The values that the page shows."""
-
-    vessel: Vessel  # as it was before the estimation
-    found: Assessment  # the estimates and their assessment
-
-    @property
-    def drawn(self) -> tuple[Assessed, ...]:
-        """The methods whose simulations are drawn: the one in the vessel file, then those that simulate most runs."""
-        others = [item for item in self.found.methods if item is not self.found.best]
-        others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
-        return (self.found.best, *others)[:DRAWN_METHODS]
-
-
 # Sentences on an estimation: its parameters and data, and which estimate to use.
 
 
-def summary(content: EstimateContent) -> list[str]:
+def summary(found: Assessment, vessel: Vessel) -> list[str]:
     """The estimated parameters and the data, in a few sentences."""
-    found, best = content.found, content.found.best
+    best = found.best
     batches = found.record.batches
     seconds = sum(len(batch) * batch.sample_time_s for batch in batches)
     samples = sum(len(batch) for batch in batches)
@@ -71,7 +55,7 @@ def summary(content: EstimateContent) -> list[str]:
     apart = f" Test data, not used for estimation: {tests}." if found.tests.batches else ""
     fixed = f" Fixed parameters: {', '.join(found.fixed)}." if found.fixed else ""
     return [
-        f"Estimated: {words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name}, from "
+        f"Estimated: {words.counted(len(best.estimate.names), 'parameter')} of {vessel.name}, from "
         f"{words.counted(len(batches), 'run')} with {words.counted(samples, 'sample')} in {words.duration(seconds)}."
         f"{apart}{fixed}",
         f"The file vessel-estimated.toml holds the estimate by {best.method.title} ({best.method.name}).",
@@ -96,18 +80,11 @@ def _fit_sentence(best: Assessed) -> str:
     return f"Fit of its simulations, median over runs: {'; '.join(parts)}." if parts else "No run could be simulated."
 
 
-def conditions(content: EstimateContent) -> list[str]:
-    """Where the data of the chosen estimate break the excitation condition."""
-    best = content.found.best
-    chosen = sample_notes(best.estimate.residuals)
-    return [*chosen, *breach_sentences(best.breaches, len(content.found.record.batches))]
-
-
-def advice(content: EstimateContent) -> list[str]:
+def advice(found: Assessment) -> list[str]:
     """Advice on the choice of the estimate, from the residuals of these data."""
-    best = content.found.best
+    best = found.best
     lag = best.one_step.autocorrelation[1]
-    sentences = [*([content.found.why] if content.found.why else []), *unstable_warning(content.found)]
+    sentences = [*([found.why] if found.why else []), *unstable_warning(found)]
     if (lag < -0.25).any():
         sentences.append(
             f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated. This indicates "
@@ -139,16 +116,15 @@ LIMIT_HEADER = (
 )  # fmt: skip
 
 
-def estimate_document(content: EstimateContent) -> Document:
-    """The estimates for people."""
-    found, ship = content.found, content.vessel
+def estimate_document(found: Assessment, ship: Vessel) -> Document:
+    """The estimates for people, with the ship as it was before."""
     step_s, batches = found.record.batches[0].sample_time_s, found.record.batches
     return Document(
         kind="Estimated manoeuvring model",
         title=ship.name,
         name=f"Estimate {ship.name}",
         about=f"{words.ship(ship)}; sample time {step_s:g} s",
-        findings=tuple(summary(content)),
+        findings=tuple(summary(found, ship)),
         facts={
             "runs": len(batches),
             "samples": sum(len(batch) for batch in batches),
@@ -157,18 +133,18 @@ def estimate_document(content: EstimateContent) -> Document:
         },
         values=estimate_values(found),
         sections=filled(
-            _parameters(content),
-            *_choice(content),
+            _parameters(found, ship.model),
+            *_choice(found),
             _fit(found),
             _limits(found),
-            *_runs(content),
+            *_runs(found),
             _residuals(found),
-            *_methods(content),
+            *_methods(found),
             section("Current and wind", _table(disturbance_table(found), texts=3), DISTURBANCES),
             section("Samples used", used_samples(found)),
             section("Methods without an estimate", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
         ),
-        notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(content)),
+        notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(found)),
     )
 
 
@@ -200,19 +176,21 @@ def _table(headed: tuple[tuple[str, ...], list[tuple[str, ...]]], *, texts: int 
     return Table(title=title, header=header, rows=rows, texts=texts)
 
 
-def _parameters(content: EstimateContent) -> Section:
-    found = content.found
+def _parameters(found: Assessment, model: VesselModel) -> Section:
     explained = tuple(f"{item.method.name}\n\u00b1 standard deviation, 95 % interval" for item in found.methods)
     chosen = next(number for number, item in enumerate(found.methods, start=2) if item is found.best)
     of_page = Table(
-        header=("Parameter\nits term", "Before", *explained), rows=parameter_rows(content), shaded=chosen, on="page"
+        header=("Parameter\nits term", "Before", *explained),
+        rows=parameter_rows(found, model),
+        shaded=chosen,
+        on="page",
     )
     title, (header, rows) = "Estimates, with standard deviations", parameter_table(found)
     return section(
         "Parameters",
         of_page,
         Table(title=title, header=header, rows=rows, on="terminal"),
-        f"{motion_words(found)} The model is in {content.vessel.model.form} form. The shaded column is written to the "
+        f"{motion_words(found)} The model is in {model.form} form. The shaded column is written to the "
         "vessel file. The standard deviations account for correlated residuals. They measure random error only, not "
         "errors of the model structure.",
         Figure(
@@ -223,13 +201,15 @@ def _parameters(content: EstimateContent) -> Section:
     )
 
 
-def _choice(content: EstimateContent) -> Iterator[Section]:
+def _choice(found: Assessment) -> Iterator[Section]:
     """Which estimate to use."""
-    found = content.found
-    yield section("Which estimate to use", *notes_of(advice(content)), Items(METHODS_IN_WORDS))
+    yield section("Which estimate to use", *notes_of(advice(found)), Items(METHODS_IN_WORDS))
     predictions = _table(prediction_table(found), title=prediction_title(found))
     yield section(prediction_title(found), predictions, PREDICTIONS, level=3)
-    broken = conditions(content)
+    broken = [
+        *sample_notes(found.best.estimate.residuals),
+        *breach_sentences(found.best.breaches, len(found.record.batches)),
+    ]
     holds = "It holds in all runs, for the noise stated in the vessel file and no current."
     yield section("Excitation condition", *(notes_of(broken) or (holds,)), level=3)
 
@@ -256,15 +236,17 @@ def _limits(found: Assessment) -> Section:
     )
 
 
-def _runs(content: EstimateContent) -> Iterator[Section]:
-    """Every run as it was measured and simulated."""
-    found = content.found
+def _runs(found: Assessment) -> Iterator[Section]:
+    """Every run as it was measured, and simulated by the best method and those that simulate most runs."""
+    others = [item for item in found.methods if item is not found.best]
+    others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
+    drawn = (found.best, *others)[:DRAWN_METHODS]
     figures = []
     for number, (limits, run) in enumerate(zip(found.limits, found.best.runs, strict=True)):
         use = "test run, not used for estimation" if run.use == "test" else "used for estimation"
         about = " \u00b7 ".join([use, *([run.problem] if run.problem else [])])
         caption = Markup("<b>{}</b> \u00b7 {}<br>{}").format(run.batch.name, about, sentence(limits, run))
-        figures.append(Figure(draw=partial(run_figure, number, content.drawn), caption=caption, above=True))
+        figures.append(Figure(draw=partial(run_figure, number, drawn), caption=caption, above=True))
     yield section("Run by run", *figures)
 
 
@@ -298,14 +280,14 @@ def _residuals(found: Assessment) -> Section:
     )
 
 
-def _methods(content: EstimateContent) -> Iterator[Section]:
+def _methods(found: Assessment) -> Iterator[Section]:
     """How each method worked, and what it warns of."""
     yield section("Methods and warnings")
-    for item in content.found.methods:
+    for item in found.methods:
         diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
         warnings = notes_of((*item.estimate.warnings, *diverged), of=item.method.name)
         title = f"{item.method.name}: {item.method.title}"
-        yield section(title, _how(content.found, item), *(warnings or ("No warnings.",)), level=3)
+        yield section(title, _how(found, item), *(warnings or ("No warnings.",)), level=3)
 
 
 def _how(found: Assessment, item: Assessed) -> str:
@@ -380,20 +362,18 @@ DISTURBANCES = (
 )
 
 
-def _data_notes(content: EstimateContent) -> tuple[str, ...]:
+def _data_notes(found: Assessment) -> tuple[str, ...]:
     """Notes on the files, doubts first, and on methods without an answer."""
-    found = content.found
     return tuple(dict.fromkeys([*found.record.doubts, *found.record.notes, *found.tests.notes, *found.left_out]))
 
 
-def parameter_rows(content: EstimateContent) -> list[tuple[str, ...]]:
+def parameter_rows(found: Assessment, model: VesselModel) -> list[tuple[str, ...]]:
     """Every parameter of the model: its term, value before, and value with deviation and 95 % interval per method."""
-    model = content.vessel.model
     return [
         (
             f"{term.name}\n{term.expression} in d{term.equation}/dt",
             words.significant(float(value)),
-            *(_cell(item, term.name) for item in content.found.methods),
+            *(_cell(item, term.name) for item in found.methods),
         )
         for term, value in zip(model.terms, model.parameters, strict=True)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import partial
 
 import numpy as np
@@ -42,21 +42,6 @@ HEADER = (
     "Not told from",
 )
 """Columns of the table for people."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ForesightContent:
-    """The values that page and file show."""
-
-    scenario: str  # its name
-    vessel: str  # its name
-    source: str  # the trial, in words
-    found: Foresight  # what is foreseen
-
-
-def foresight_rows(found: Foresight) -> tuple[tuple[str, ...], ...]:
-    """One row for the least visible effect of every cause, in the order of `HEADER`."""
-    return tuple(effect_row(item) for item in found.weakest)
 
 
 def effect_row(item: Foreseen) -> tuple[str, ...]:
@@ -136,14 +121,13 @@ def size_text(name: str, change: float, unit: str) -> str:
     return f"{words.significant(abs(change), 2)} {unit}".rstrip()
 
 
-def foresight_json(content: ForesightContent) -> str:
-    """`foresee.json`."""
-    found = content.found
+def foresight_json(found: Foresight, *, scenario: str, vessel: str, source: str) -> str:
+    """`foresee.json`, with the names of scenario and vessel, and what is diagnosed in words."""
     return strict_json(
         {
-            "scenario": content.scenario,
-            "vessel": content.vessel,
-            "trial": content.source,
+            "scenario": scenario,
+            "vessel": vessel,
+            "trial": source,
             "duration_s": found.duration_s,
             "wanted_power": found.wanted_power,
             "random_current_mps": found.random_current_mps,
@@ -225,19 +209,18 @@ EVERY_HEADER = (
 )  # fmt: skip
 
 
-def foresight_document(content: ForesightContent) -> Document:
-    """What a diagnosis would find, for people."""
-    found = content.found
+def foresight_document(found: Foresight, *, scenario: str, vessel: str, source: str) -> Document:
+    """What a diagnosis would find, for people; the names are those of `foresight_json`."""
     more = f". All effects that can reach it need {runs_text(found.together)}" if found.together else ""
     return Document(
         kind="A diagnosis before sailing",
-        title=content.scenario,
-        name=f"What a diagnosis of {content.scenario} would find",
-        about=f"{content.vessel}: {content.source}, {words.duration(found.duration_s)}.",
+        title=scenario,
+        name=f"What a diagnosis of {scenario} would find",
+        about=f"{vessel}: {source}, {words.duration(found.duration_s)}.",
         findings=tuple(conclusions(found)),
         facts={"diagnosed_s": found.duration_s, "causes_tested": len(found.weakest)},
         values={
-            "trial": content.source,
+            "trial": source,
             "causes_missed": list(found.missed),
             "causes_not_seen": [cause for cause, _ in found.unseen],
             "not_told_apart": [
@@ -248,7 +231,7 @@ def foresight_document(content: ForesightContent) -> Document:
             section(
                 "Power",
                 Figure(draw=partial(power_figure, found), caption=POWER),
-                Table(header=HEADER, rows=foresight_rows(found), texts=2),
+                Table(header=HEADER, rows=[effect_row(item) for item in found.weakest], texts=2),
                 "\u201c90 % from\u201d is the size that the test accepts with that probability; \u201c90 % with\u201d "
                 f"are the runs of one manoeuvre that reach 90 % at the size that matters in the least time{more}.",
             ),
@@ -322,22 +305,8 @@ FINDS = 0.5
 """Share of voyages from which a change counts as found."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class OperationContent:
-    """The values that page and file show."""
-
-    # scenario, vessel: their names
-    scenario: str
-    vessel: str
-    found: OperationForesight  # what is foreseen
-
-
-def operation_rows(found: OperationForesight) -> tuple[tuple[str, ...], ...]:
-    """One row for each change and size, in the order of `OPERATION_HEADER`."""
-    return tuple(_row(item) for item in found.rows)
-
-
-def _row(item: Detectability) -> tuple[str, ...]:
+def operation_row(item: Detectability) -> tuple[str, ...]:
+    """One change of one size, in the order of `OPERATION_HEADER`."""
     low, high = interval(item.found, item.voyages)
     return (
         item.change,
@@ -386,9 +355,8 @@ def _named(item: Detectability) -> str:
     return f"{item.change.capitalize()} by {100.0 * item.size:g} %"
 
 
-def operation_json(content: OperationContent) -> str:
-    """The content as JSON; a delay of null is longer than a voyage."""
-    found = content.found
+def operation_json(found: OperationForesight, *, vessel: str) -> str:
+    """`operation.json`; a delay of null is longer than a voyage."""
     rows = []
     for item in found.rows:
         table = {**asdict(item), "delay_s": item.delay_s if math.isfinite(item.delay_s) else None}
@@ -396,7 +364,7 @@ def operation_json(content: OperationContent) -> str:
         rows.append(table)
     return strict_json(
         {
-            "vessel": content.vessel,
+            "vessel": vessel,
             "sentences": list(operation_sentences(found)),
             "voyage_s": found.voyage_s,
             "reference_s": found.reference_s,
@@ -410,20 +378,19 @@ def operation_json(content: OperationContent) -> str:
     )
 
 
-def operation_document(content: OperationContent) -> Document:
+def operation_document(found: OperationForesight, *, scenario: str, vessel: str) -> Document:
     """What a watch would find, for people."""
-    found = content.found
     return Document(
         kind="A watch before it begins",
-        title=content.vessel,
-        name=f"What a watch over {content.vessel} would find",
-        about=f"Simulated voyages of {words.duration(found.voyage_s)}, in the weather of {content.scenario}.",
+        title=vessel,
+        name=f"What a watch over {vessel} would find",
+        about=f"Simulated voyages of {words.duration(found.voyage_s)}, in the weather of {scenario}.",
         findings=tuple(operation_sentences(found)),
         facts={"voyages_without_change": found.nominal, "false_alarms": found.false_alarms},
         sections=(
             section(
                 "Changes",
-                Table(header=OPERATION_HEADER, rows=operation_rows(found), texts=2),
+                Table(header=OPERATION_HEADER, rows=[operation_row(item) for item in found.rows], texts=2),
                 "Found: voyages that raise an alarm, with the exact 95 % interval of their share. Median delay: from "
                 "the beginning of the voyage, when the change is there already. Named rightly: the alarm names the "
                 "change, or one of its parts, at the end of the voyage. As likely: the right one is among the changes "

@@ -129,7 +129,7 @@ def mapping_toml(mapping: Decisions, logs: Sequence[Log], *, command: str) -> st
         lines += ["", "[[file]]", f"name = {_text(clock.file)}", f"offset_s = {clock.offset_s!r}"]
         lines += [f"offset_std_s = {clock.offset_std_s!r}"] if clock.offset_std_s else []
         lines += [f"sample_time_s = {clock.sample_time_s!r}"] * bool(
-            clock.sample_time_s or _has_no_clock(logs, clock.file)
+            clock.sample_time_s or any(log.source == clock.file and log.clock == "no clock" for log in logs)
         )
     for use in mapping.uses:
         if use.column:
@@ -142,10 +142,6 @@ def mapping_toml(mapping: Decisions, logs: Sequence[Log], *, command: str) -> st
         lines += ["", "# Not used; add a table [[channel]] for what should be:"]
         lines += [f"# file = {_text(use.file)}, channel = {_text(use.channel)} ({use.why})" for use in rest]
     return "\n".join(lines) + "\n"
-
-
-def _has_no_clock(logs: Sequence[Log], name: str) -> bool:
-    return any(log.source == name and log.clock == "no clock" for log in logs)
 
 
 def _text(value: str) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 from expdesign import __version__
 from expdesign.export.document import Document, Table, notes_of, section
@@ -53,24 +51,15 @@ PLANING = "wave-making and planing are not in the regressions, state speeds at s
 HUMP = 0.45
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class NominalContent:
-    """The values that page and files show."""
-
-    nominal: Nominal
-    command: str  # to reproduce it
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What contradicts, and what to bear in mind."""
-        found = self.nominal
-        measured = any(one.trial.kind != "speed" for one in found.card.stated)
-        calm = "Without [windage] no term reads the wind: simulated wind does not move her."
-        froude = found.driving[0].design_mps / math.sqrt(9.81 * found.card.hull.length_m)
-        forms = () if is_usual(found.card.hull) else (UNUSUAL,)
-        planes = (f"At full order her Froude number is {froude:.2f}: {PLANING}",) if froude > HUMP else ()
-        windless = () if found.card.windage else (calm,)
-        return (*found.contradictions, *(() if measured else (NO_TRIAL,)), *forms, *planes, SIDES, SPEEDS, *windless)
+def nominal_notes(found: Nominal) -> tuple[str, ...]:
+    """What contradicts, and what to bear in mind."""
+    measured = any(one.trial.kind != "speed" for one in found.card.stated)
+    calm = "Without [windage] no term reads the wind: simulated wind does not move her."
+    froude = found.driving[0].design_mps / math.sqrt(9.81 * found.card.hull.length_m)
+    forms = () if is_usual(found.card.hull) else (UNUSUAL,)
+    planes = (f"At full order her Froude number is {froude:.2f}: {PLANING}",) if froude > HUMP else ()
+    windless = () if found.card.windage else (calm,)
+    return (*found.contradictions, *(() if measured else (NO_TRIAL,)), *forms, *planes, SIDES, SPEEDS, *windless)
 
 
 def trial_words(trial: Trial) -> str:
@@ -91,11 +80,6 @@ def trial_words(trial: Trial) -> str:
     return f"drift in {speed} of wind on the beam"
 
 
-def trial_rows(content: NominalContent) -> list[tuple[str, ...]]:
-    """One for each predicted result."""
-    return [_trial_row(one) for one in content.nominal.predicted]
-
-
 def _trial_row(one: Predicted) -> tuple[str, ...]:
     def text(value: float) -> str:
         return shown(one.quantity, value) if math.isfinite(value) else "no end"
@@ -107,31 +91,11 @@ def _trial_row(one: Predicted) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def factor_rows(content: NominalContent) -> list[tuple[str, ...]]:
-    """One for each part of the forces, with the source of its value."""
-    return [
-        (one.name, one.source, f"{100 * one.std_log:.0f} %", f"{one.value:.2f}", f"{100 * one.std_log_after:.0f} %")
-        for one in content.nominal.found
-    ]
-
-
-def taken_rows(content: NominalContent) -> list[tuple[str, ...]]:
-    """One for each thruster that drives her, with what the card leaves open."""
-    return [
-        (
-            f"n{one.number}, {one.thruster.kind}", f"{one.diameter_m:.3g} m", f"{60 * one.max_rps:.4g} rpm",
-            f"{one.pitch_ratio:.2f}", f"{one.wake:.2f}", f"{one.deduction:.2f}",
-        )
-        for one in content.nominal.driving
-    ]  # fmt: skip
-
-
-def nominal_json(content: NominalContent) -> str:
+def nominal_json(found: Nominal, command: str) -> str:
     """All results as JSON, SI."""
-    found = content.nominal
     return strict_json(
         {
-            "command": content.command,
+            "command": command,
             "version": __version__,
             "vessel": found.vessel.name,
             "trials": [
@@ -151,27 +115,34 @@ def nominal_json(content: NominalContent) -> str:
                 for one in found.found
             },
             "contradictions": list(found.contradictions),
-            "notes": list(content.notes),
+            "notes": list(nominal_notes(found)),
         }
     )  # fmt: skip
 
 
-def nominal_toml(content: NominalContent) -> str:
+def nominal_toml(found: Nominal, command: str) -> str:
     """The vessel file; its head says where the numbers come from."""
-    return vessel_toml(content.nominal.vessel, comments=tuple(_head(content)))
+    head = (
+        f"{found.vessel.name}, made by: {command}",
+        "Forces from particulars by published formulas; each part times what the card's trial values make of it:",
+        *(f"  {one.name}: times {one.value:.3f}, {100 * one.std_log_after:.0f} %; {one.source}" for one in found.found),
+    )
+    return vessel_toml(found.vessel, comments=(*head, *nominal_notes(found)))
 
 
-def _head(content: NominalContent) -> Iterator[str]:
-    yield f"{content.nominal.vessel.name}, made by: {content.command}"
-    yield "Forces from particulars by published formulas; each part times what the card's trial values make of it:"
-    for one in content.nominal.found:
-        yield f"  {one.name}: times {one.value:.3f}, {100 * one.std_log_after:.0f} %; {one.source}"
-    yield from content.notes
-
-
-def nominal_document(content: NominalContent) -> Document:
+def nominal_document(found: Nominal) -> Document:
     """The vessel for people."""
-    found = content.nominal
+    factors = [
+        (one.name, one.source, f"{100 * one.std_log:.0f} %", f"{one.value:.2f}", f"{100 * one.std_log_after:.0f} %")
+        for one in found.found
+    ]
+    taken = [
+        (
+            f"n{one.number}, {one.thruster.kind}", f"{one.diameter_m:.3g} m", f"{60 * one.max_rps:.4g} rpm",
+            f"{one.pitch_ratio:.2f}", f"{one.wake:.2f}", f"{one.deduction:.2f}",
+        )
+        for one in found.driving
+    ]  # fmt: skip
     return Document(
         kind="Nominal vessel, from particulars and stated trials",
         title=found.vessel.name,
@@ -183,17 +154,17 @@ def nominal_document(content: NominalContent) -> Document:
         },
         values={"vessel": found.vessel.name, "contradictions": list(found.contradictions)},
         sections=(
-            section("To bear in mind", *notes_of(content.notes)),
+            section("To bear in mind", *notes_of(nominal_notes(found))),
             section(
                 "Where the numbers come from",
-                Table(header=FACTOR_HEADER, rows=factor_rows(content), texts=2),
+                Table(header=FACTOR_HEADER, rows=factors, texts=2),
                 "Each part of the forces has the value of its source, times the number in the table. The scatter "
                 "is one standard deviation.",
             ),
-            section("Thrusters that drive her", Table(header=TAKEN_HEADER, rows=taken_rows(content), texts=1)),
+            section("Thrusters that drive her", Table(header=TAKEN_HEADER, rows=taken, texts=1)),
             section(
                 "Her trials",
-                Table(header=TRIAL_HEADER, rows=trial_rows(content), texts=2),
+                Table(header=TRIAL_HEADER, rows=[_trial_row(one) for one in found.predicted], texts=2),
                 "Intervals hold 95 of 100 trials of ships that the particulars and the stated values allow. "
                 "\u201cNo end\u201d: some of these ships do not come to the end of the trial.",
             ),

@@ -19,7 +19,6 @@ from expdesign.roll import (
     PARAMETERS,
     TUNING,
     UNITS,
-    Direction,
     LowPass,
     NullSpace,
     RollEstimate,
@@ -253,7 +252,7 @@ def roll_json(content: RollContent) -> str:
                 "rank": report.rank,
                 "singular_values": report.singular_values.tolist(),
                 "open": [one.change for one in report.open],
-                "faint": [_direction_entry(one) for one in report.faint],
+                "faint": [{"change": one.change, "relative_std": 1.0 / one.size} for one in report.faint],
                 "cures": [vars(one) for one in report.cures],
             },
             "filter": {
@@ -308,10 +307,6 @@ def _scaled(content: RollContent) -> dict[str, object]:
 
 def _determined(content: RollContent, name: str) -> bool:
     return name in content.estimate.problem.free and name not in content.report.undetermined
-
-
-def _direction_entry(one: Direction) -> dict[str, object]:
-    return {"change": one.change, "relative_std": 1.0 / one.size}
 
 
 def _parameter(content: RollContent, name: str) -> dict[str, object]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -41,18 +40,6 @@ CHANCE = 0.01
 """Probability that a bias, or a wrong standard deviation, is reported where there is none."""
 ERROR_LIMIT = 1.5
 """Normalised error below which the thesis calls a trial good."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ValidationContent:
-    """The values that page and file show."""
-
-    scenario: str  # its name
-    rehearsal: Rehearsal  # the simulated trials
-    results: tuple[Validated, ...]  # of every design
-    # primitives of the optimised design in which noise or weather may change the sign of a velocity inside an absolute
-    # value
-    noisy_moduli: tuple[str, ...]
 
 
 def chance(result: Validated) -> float:
@@ -102,15 +89,22 @@ def _named(result: Validated, chosen: NDArray[np.bool_]) -> list[str]:
     return [name for name, is_so in zip(result.parameters, chosen, strict=True) if is_so]
 
 
-def judgements(content: ValidationContent) -> tuple[str, ...]:
-    """The conclusions from the trials, in sentences."""
-    judged = [sentence for item in content.results for sentence in _judged(item)]
-    doubtful = any(biased(item) or off_theory(item) for item in content.results)
-    return (*_comparison(content), *judged, *(_assumptions(content) if doubtful else ()))
+def judgements(rehearsal: Rehearsal, results: Sequence[Validated], *, noisy_moduli: Sequence[str]) -> tuple[str, ...]:
+    """The conclusions from the trials, in sentences.
+
+    Args:
+        rehearsal: the simulated trials.
+        results: of every design, that of the optimised one first.
+        noisy_moduli: primitives of the optimised design in which noise or weather may change the sign of a velocity
+            inside an absolute value.
+    """
+    judged = [sentence for item in results for sentence in _judged(item)]
+    doubtful = any(biased(item) or off_theory(item) for item in results)
+    return (*_comparison(results), *judged, *(_assumptions(rehearsal, noisy_moduli) if doubtful else ()))
 
 
-def _comparison(content: ValidationContent) -> Iterator[str]:
-    best, *others = content.results
+def _comparison(results: Sequence[Validated]) -> Iterator[str]:
+    best, *others = results
     for other in others:
         ratio = float(np.exp(np.mean(np.log(other.found / best.found))))
         yield (
@@ -147,10 +141,10 @@ def _judged(result: Validated) -> Iterator[str]:
         yield f"{result.design.capitalize()}: the bias exceeds half a standard deviation for {', '.join(shifted)}."
 
 
-def _assumptions(content: ValidationContent) -> Iterator[str]:
+def _assumptions(rehearsal: Rehearsal, noisy_moduli: Sequence[str]) -> Iterator[str]:
     """Which assumptions of the prediction do not hold here."""
-    rehearsal = content.rehearsal
-    found = [f"Assumption that fails: {text}" for text in (*_of_motion(content), *_of_weather(rehearsal))]
+    failing = (*_of_motion(rehearsal, noisy_moduli), *_of_weather(rehearsal))
+    found = [f"Assumption that fails: {text}" for text in failing]
     yield from found
     if not found:
         yield (
@@ -159,17 +153,16 @@ def _assumptions(content: ValidationContent) -> Iterator[str]:
         )
 
 
-def _of_motion(content: ValidationContent) -> Iterator[str]:
-    rehearsal = content.rehearsal
+def _of_motion(rehearsal: Rehearsal, noisy_moduli: Sequence[str]) -> Iterator[str]:
     if method_named(rehearsal.method).solver == "ls":
         yield (
             "the regressors have no noise. Sensor noise biases least squares. The prediction is for instrumental "
             "variables."
         )
-    if content.noisy_moduli:
+    if noisy_moduli:
         yield (
             "every velocity inside an absolute value keeps its sign under noise. The sign may change in "
-            f"{', '.join(content.noisy_moduli)}."
+            f"{', '.join(noisy_moduli)}."
         )
     if rehearsal.integrator == "rk4" and rehearsal.nominal.model.form == "discrete":
         yield (
@@ -218,11 +211,10 @@ def _there(solver: str, *allows: str) -> str:
     return f"{', '.join(first)} or {last}" if first else last
 
 
-def validation_json(content: ValidationContent) -> str:
+def validation_json(rehearsal: Rehearsal, results: Sequence[Validated], *, scenario: str, judged: Sequence[str]) -> str:
     """`validation.json`."""
-    rehearsal = content.rehearsal
     described = {
-        "scenario": content.scenario,
+        "scenario": scenario,
         "truth": rehearsal.truth.name,
         "method": rehearsal.method,
         "mean_subtraction": rehearsal.mean_subtraction,
@@ -230,8 +222,8 @@ def validation_json(content: ValidationContent) -> str:
         "integrator": rehearsal.integrator,
         "trials": rehearsal.trials,
         "seed": rehearsal.seed,
-        "designs": {item.design: _entry(rehearsal, item) for item in content.results},
-        "judgements": list(judgements(content)),
+        "designs": {item.design: _entry(rehearsal, item) for item in results},
+        "judgements": list(judged),
     }
     return strict_json(described)
 
@@ -327,25 +319,26 @@ PARAMETER_HEADER = (
 )
 
 
-def validation_document(content: ValidationContent) -> Document:
+def validation_document(
+    rehearsal: Rehearsal, results: tuple[Validated, ...], *, scenario: str, judged: tuple[str, ...]
+) -> Document:
     """The trials for people."""
-    rehearsal = content.rehearsal
     return Document(
         kind="Designs in Monte Carlo trials",
-        title=content.scenario,
-        name=f"Validation of the design of {content.scenario}",
+        title=scenario,
+        name=f"Validation of the design of {scenario}",
         about=f"{rehearsal.trials} simulated trials of each design. True ship: {rehearsal.truth.name}. Nominal model: "
         f"{rehearsal.nominal.name}. Estimator: {method_named(rehearsal.method).title} ({rehearsal.method}).",
-        findings=judgements(content),
+        findings=judged,
         values={
             "trials_of_each_design": rehearsal.trials,
-            "median_error": {item.design: float(np.median(item.errors)) for item in content.results},
-            "without_estimate": {item.design: item.failed for item in content.results},
+            "median_error": {item.design: float(np.median(item.errors)) for item in results},
+            "without_estimate": {item.design: item.failed for item in results},
         },
         sections=(
-            _designs(content),
-            *_accuracy(content.results),
-            *(_parameters(item) for item in content.results),
+            _designs(rehearsal, results),
+            *_accuracy(results),
+            *(_parameters(item) for item in results),
             section(
                 "Method",
                 "Each trial simulates a number of whole runs from their entry velocities, measures them with the "
@@ -357,16 +350,16 @@ def validation_document(content: ValidationContent) -> Document:
     )
 
 
-def _designs(content: ValidationContent) -> Section:
+def _designs(rehearsal: Rehearsal, results: tuple[Validated, ...]) -> Section:
     header = ("Design", "Runs", "Median error", "95th percentile", f"Error below {ERROR_LIMIT:g}", "No estimate")
-    rows = [_design_row(content, item) for item in content.results]
+    rows = [_design_row(rehearsal, item) for item in results]
     return section(
         "Designs",
         Table(header=header, rows=rows, texts=2),
         "All designs have the same informative time, up to the rounding to whole runs. The error of a trial is "
         "the root mean square over the parameters of (estimate \u2212 truth) / |truth|.",
         Figure(
-            draw=partial(error_figure, content.results),
+            draw=partial(error_figure, results),
             caption="Share of trials whose error is below the value on the axis. A curve further left is better.",
         ),
     )
@@ -389,9 +382,9 @@ def _parameters(result: Validated) -> Section:
     return section(f"Parameters, {result.design}", table)
 
 
-def _design_row(content: ValidationContent, result: Validated) -> tuple[str, ...]:
-    runs = content.rehearsal.designs[result.design]
-    names = [primitive.name for primitive in content.rehearsal.primitives]
+def _design_row(rehearsal: Rehearsal, result: Validated) -> tuple[str, ...]:
+    runs = rehearsal.designs[result.design]
+    names = [primitive.name for primitive in rehearsal.primitives]
     spelled = (
         "random in every trial"
         if runs is None

@@ -143,11 +143,6 @@ def _is_angle(name: str) -> bool:
     return name in ("heading_rad", MAGNETIC, COG, "wind_angle_rad") or (input_name(name)[:1] == "a" and _is_input(name))
 
 
-def _is_held(name: str) -> bool:
-    """Whether a value stands until the next one: orders, marks."""
-    return (_is_input(name) and not name.startswith(REACHED)) or name.startswith(PLANNED) or name in (STEERED, "batch")
-
-
 def _without_north(channel: Channel) -> tuple[Channel, int]:
     """The channel without readings that were averaged or interpolated the long way round, and their number.
 
@@ -330,7 +325,7 @@ def _resampled(name: str, channel: Channel, times: Array, step_s: float) -> Arra
     ratio = channel.interval_s / step_s
     parts = math.ceil(1.0 / max(ratio, 1e-4)) if ratio < 1.0 / SAME else 1
     shares = (np.arange(parts) + 0.5) / parts
-    if _is_held(name):
+    if (_is_input(name) and not name.startswith(REACHED)) or name.startswith(PLANNED) or name in (STEERED, "batch"):
         shift = EARLY * min(channel.interval_s, step_s) if parts == 1 else 0.0
         at = np.zeros(1) if parts == 1 else shares
         found = np.zeros(len(times))

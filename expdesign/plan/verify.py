@@ -71,7 +71,7 @@ def verify_plan(
     standing = np.zeros(len(vessel.limits)) if under_way is None else under_way.inputs
     excess, excess_signal = _limit_excess(vessel, commands, standing)
     begin = None if under_way is None else under_way.velocity
-    heel = _heel(again)
+    heel = None if again.auxiliary is None else np.abs(again.auxiliary[:, AUXILIARY.index("roll_rad")])
     problems = [
         *anew.problems(vessel.length_m),
         *_end_problems(vessel, environment, trajectory, (start, goal), begin),
@@ -100,11 +100,6 @@ def verify_plan(
         problems=tuple(problems),
         heel_max_rad=None if heel is None else float(heel.max()),
     )
-
-
-def _heel(again: Trajectory) -> Array | None:
-    """(k + 1,) size of the roll angle; None without roll."""
-    return None if again.auxiliary is None else np.abs(again.auxiliary[:, AUXILIARY.index("roll_rad")])
 
 
 def _heel_problems(vessel: Vessel, heel: Array | None, legs: Sequence[Leg], step_s: float) -> tuple[str, ...]:

@@ -125,11 +125,6 @@ def instrument_columns(simulated: Array) -> Array:
     return np.column_stack([delayed(roll_rate, range(1, 1 + LAGS)), *parts, bent(roll_rate)])
 
 
-def whitened_columns(own: Sequence[Fold], noise: NoiseModel) -> list[Array]:
-    """(n, q) instruments of each fold at the rows of a run, whitened as these are."""
-    return [noise.whitened(fold.columns)[LEFT_OUT_SAMPLES:] for fold in own]
-
-
 def stitched(own: Sequence[Fold], columns: Sequence[Array], noise: NoiseModel) -> Array:
     """(n, q) rows of each fold's part of a run from its own columns (n, q)."""
     first = LEFT_OUT_SAMPLES
@@ -179,7 +174,7 @@ def weighted_equations(
     else:
         # through 1 / spectrum are the weights of least variance; the equation is whitened too, as instruments that end
         # suddenly would pick up the noise of high frequencies, which is many times stronger
-        white = [whitened_columns(own, model) for own in instruments]
+        white = [[model.whitened(fold.columns)[LEFT_OUT_SAMPLES:] for fold in own] for own in instruments]
         pairs = list(zip(instruments, white, strict=True))
         basis = _basis([stitched(own, [left.divided(part) for part in one], model) for own, one in pairs], left)
         hidden = _hidden(rows, [stitched(own, one, model) for own, one in pairs]) if follows else ()

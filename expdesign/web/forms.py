@@ -68,7 +68,7 @@ class Form:
             self._draw_numbers(path, field)
         elif inner is None:
             self._draw_value(path, field)
-        elif _is_list(field.annotation):
+        elif any(get_origin(part) is list for part in _parts(field.annotation)):
             self._draw_list(path, field, {"": inner})
         else:
             self._draw_table(path, field, inner)
@@ -156,7 +156,7 @@ class Form:
         else:
             text = "" if value is None else value if isinstance(value, str) else _toml(value)
             shown = ui.input(value=text, **common)
-            words = _is_text(field.annotation)
+            words = any(part is str for part in _parts(field.annotation))
             shown.on("blur", lambda: self._told(note, path, *_typed(shown.value, words)))
             shown.on("keydown.enter", lambda: self._told(note, path, *_typed(shown.value, words)))
         shown.classes("field").props("dense")
@@ -269,14 +269,6 @@ def _is_numbers(annotation: Any) -> bool:
         get_origin(part) is dict and not any(get_origin(one) is dict for one in get_args(part))
         for part in _parts(annotation)
     )
-
-
-def _is_list(annotation: Any) -> bool:
-    return any(get_origin(part) is list for part in _parts(annotation))
-
-
-def _is_text(annotation: Any) -> bool:
-    return any(part is str for part in _parts(annotation))
 
 
 def _choices(annotation: Any) -> tuple[Any, ...]:

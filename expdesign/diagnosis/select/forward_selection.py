@@ -82,7 +82,7 @@ def select_forward(
             and (len(steps) < 2 or work.allows("exchanges of causes"))
         ):
             exchanges += 1
-            useful = _up_to_last_gain(steps, gains)
+            useful = steps[: max(place + 1 for place, one in enumerate(gains) if one)]
             exchanged = _exchange(useful, steps[len(useful)].tests if idle else tests, search)
             if exchanged is not None:
                 steps, base = exchanged, exchanged[-1].chosen.fit
@@ -118,11 +118,6 @@ def _gains(fits: Sequence[Fit], validation: CrossValidation) -> list[bool]:
 def _gains_last(first: Fit, steps: Sequence[Step], validation: CrossValidation) -> bool:
     """Whether the last step improves on those before it, or is the first."""
     return all(_gains([first, *(step.chosen.fit for step in steps)], validation)[-1:])
-
-
-def _up_to_last_gain(steps: list[Step], gains: Sequence[bool]) -> list[Step]:
-    """The steps without the last ones that gain nothing: backward elimination takes these out."""
-    return steps[: max(place + 1 for place, one in enumerate(gains) if one)]
 
 
 def to_take_out(steps: Sequence[Step], redundant: int) -> int:

@@ -320,13 +320,8 @@ def fit_components(residuals: Array, parts: Sequence[Stretch], by: Sequence[Fitt
         by: what the estimate took from each output's noise; () for noise of which nothing was taken.
     """
     slow = slow_parts(parts)
-    left = left_shapes(parts, slow, by or [nothing_taken(len(residuals))] * residuals.shape[1])
+    left = left_shapes(parts, slow, by or [Fitted(*np.zeros((2, len(residuals), 0)))] * residuals.shape[1])
     return [_fitted(column, parts, own, slow) for column, own in zip(residuals.T, left, strict=True)]
-
-
-def nothing_taken(rows: int) -> Fitted:
-    """An estimate of no parameters, which took nothing from the noise of so many rows."""
-    return Fitted(*np.zeros((2, rows, 0)))
 
 
 def left_shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...], by: Sequence[Fitted]) -> Iterator[list[Array]]:

@@ -58,7 +58,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
         unused = [area for area, before in zip(areas, charted, strict=True) if not kind_of(before, table)]
         chart = _read_chart(table, features, areas, depths, given, entry)
         objects = dangers(features, table, (chart.extent[0] + chart.extent[2]) / 2)
-    used = _used_layers(table, depths)
+    used = {*table.land_layers, *table.water_layers, *depths, UNNAMED}
     signs = _sign_of_depths(depths, objects, path, table, entry)
     rules = ShipRules(
         needed_m=rule_text(file.depth, draught_m)[0],
@@ -300,10 +300,6 @@ def _deep_union(
     water = _layer_union(chart, deep, box, frame)
     shallow = [name for name in depths if name not in deep] if table.depth_property else []
     return shapely.difference(water, _layer_union(chart, shallow, box, frame)) if shallow else water
-
-
-def _used_layers(table: ChartTable, depths: Iterable[str]) -> set[str]:
-    return {*table.land_layers, *table.water_layers, *depths, UNNAMED}
 
 
 def _land(chart: Chart, table: ChartTable, depths: Iterable[str], box: Box, frame: LocalFrame) -> shapely.Geometry:

@@ -8,7 +8,7 @@ from expdesign import requests
 from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind
 from expdesign.errors import InputError
 from expdesign.estimation.methods import methods_for
-from expdesign.export.estimate_page import EstimateContent, estimate_document
+from expdesign.export.estimate_page import estimate_document
 from expdesign.export.files import estimate_json, estimated_vessel
 from expdesign.export.folder import Content
 from expdesign.progress import Progress, silent, within
@@ -52,18 +52,15 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
         begun = 0.01 if now is ship else 0.4
         found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
-    command = repeating(request)
-    content = EstimateContent(vessel=ship, found=found)
-    document = estimate_document(content)
     files: dict[str, Content] = {
         "estimate.json": estimate_json(found, ship),
-        "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
+        "vessel-estimated.toml": estimated_vessel(found, ship, command=repeating(request)),
     }
     return finished(
         request,
         Path("runs") / request.data[0].stem,
         files,
-        document,
+        estimate_document(found, ship),
         progress,
         page="estimate.html",
         drawing=within(progress, 0.7, 0.98),

@@ -8,13 +8,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files as files_of
 
 from expdesign.errors import InputError, nearest
-from expdesign.workflows.steps import file_keys
-from expdesign.workflows.steps.file_keys import Explained, Section, Topic
+from expdesign.workflows.steps.file_keys import (
+    Explained,
+    Section,
+    Topic,
+    dictionary_topic,
+    file_topic,
+    mapping_topic,
+    vessel_topic,
+)
 
 
 def families_topic() -> Topic:
@@ -45,8 +53,8 @@ def causes_topic() -> Topic:
     """Causes that a diagnosis looks for."""
     from expdesign.diagnosis.causes import CAUSES
 
-    entries = tuple(Explained(name=cause.name, meaning=cause.summary) for cause in CAUSES)
-    return _list("causes", "Causes that expdesign diagnose can name", entries)
+    meanings = {cause.name: cause.summary for cause in CAUSES}
+    return _list("causes", "Causes that expdesign diagnose can name", meanings)
 
 
 def methods_topic() -> Topic:
@@ -61,37 +69,36 @@ def methods_topic() -> Topic:
         "all estimators. A current that is taken for steady adds two parameters instead of many, and is several times "
         "more accurate where it is. All use data from which stated lags and sensor faults are undone."
     )
-    entries = tuple(Explained(name=method.name, meaning=method.title) for method in METHODS)
-    return _list("methods", "Estimators of expdesign estimate and validate", entries, text)
+    meanings = {method.name: method.title for method in METHODS}
+    return _list("methods", "Estimators of expdesign estimate and validate", meanings, text)
 
 
 def criteria_topic() -> Topic:
     """Design criteria."""
     from expdesign.durations import CRITERIA
 
-    entries = tuple(Explained(name=item.name, meaning=f"minimises the {item.title}") for item in CRITERIA)
+    meanings = {item.name: f"minimises the {item.title}" for item in CRITERIA}
     text = (
         "D_s, A and E are about the parameters in design.interest; V is about design.outcomes, "
         "T about design.reveal and design.tell_apart. A, E and V weigh "
         "equations against each other and need the sensors' noise in the vessel file."
     )
-    return _list("criteria", "Design criteria, design.criterion", entries, text)
+    return _list("criteria", "Design criteria, design.criterion", meanings, text)
 
 
 def formats_topic() -> Topic:
     """Route formats."""
     from expdesign.export.formats import FORMATS
 
-    entries = tuple(Explained(name=item.name, meaning=f"{item.summary}; writes {item.file_name}") for item in FORMATS)
-    return _list("formats", "Route formats of expdesign export", entries)
+    meanings = {item.name: f"{item.summary}; writes {item.file_name}" for item in FORMATS}
+    return _list("formats", "Route formats of expdesign export", meanings)
 
 
 def outcomes_topic() -> Topic:
     """Results of standard trials that criterion V predicts."""
     from expdesign.indices import OUTCOMES
 
-    entries = tuple(Explained(name=name, meaning=meaning) for name, meaning in OUTCOMES.items())
-    return _list("outcomes", "Results of standard trials, design.outcomes", entries)
+    return _list("outcomes", "Results of standard trials, design.outcomes", OUTCOMES)
 
 
 def structures_topic() -> Topic:
@@ -102,9 +109,8 @@ def structures_topic() -> Topic:
         Section(
             name=name,
             title=f"structure {name!r}",
-            entries=tuple(
-                Explained(name=term.name, meaning=f"multiplies {term.expression} in the equation of {term.equation}")
-                for term in terms
+            entries=_entries(
+                {term.name: f"multiplies {term.expression} in the equation of {term.equation}" for term in terms}
             ),
         )
         for name, terms in STRUCTURES.items()
@@ -120,14 +126,8 @@ def data_topic() -> Topic:
     """Columns of measured data."""
     from expdesign.records import COLUMNS
 
-    entries = tuple(
-        Explained(
-            name=item.names,
-            meaning=item.meaning,
-            allowed=f"units {', '.join(item.units)}" if item.units else "",
-        )
-        for item in COLUMNS
-    )
+    meanings = {item.names: item.meaning for item in COLUMNS}
+    units = {item.names: f"units {', '.join(item.units)}" for item in COLUMNS if item.units}
     text = (
         "A CSV file with one header row; the unit is the end of a column's name. Needed are time, the inputs of the "
         "vessel's model, and velocities or a pose to derive them from (--velocity). A gap of more than 1.5 sample "
@@ -138,41 +138,61 @@ def data_topic() -> Topic:
         "each with an estimate and its standard error; signals that are held or interpolated between readings are read "
         "in time; and the ship must answer her inputs in the sense of the vessel file."
     )
-    return _list("data", "Columns of measured data", entries, text)
+    return _list("data", "Columns of measured data", meanings, text, units)
 
 
 def import_topic() -> Topic:
     """Formats of logs."""
     from expdesign.importing import READERS
 
-    entries = tuple(
-        Explained(name=item.name, meaning=item.meaning, allowed=f"needs expdesign[{item.extra}]" if item.extra else "")
-        for item in READERS
-    )
+    meanings = {item.name: item.meaning for item in READERS}
+    needs = {item.name: f"needs expdesign[{item.extra}]" for item in READERS if item.extra}
     text = (
         "A file is known by how it begins, not by its name. All channels are read; the mapping says which become "
         "columns (expdesign explain mapping). Several logs are put on one time scale: satellite time first, then "
         "computers' clocks, then clocks of their own, set by what both logs saw."
     )
-    return _list("import", "Formats of expdesign import", entries, text)
+    return _list("import", "Formats of expdesign import", meanings, text, needs)
 
 
-def _list(name: str, title: str, entries: tuple[Explained, ...], text: str = "") -> Topic:
-    return Topic(name=name, title=title, text=text, sections=(Section(name=name, title="", entries=entries),))
+NOTHING: Mapping[str, str] = {}
+
+
+def _list(
+    name: str, title: str, meanings: Mapping[str, str], text: str = "", allowed: Mapping[str, str] = NOTHING
+) -> Topic:
+    """A topic of names with their meanings, and of some what they allow."""
+    section = Section(name=name, title="", entries=_entries(meanings, allowed))
+    return Topic(name=name, title=title, text=text, sections=(section,))
+
+
+def _entries(meanings: Mapping[str, str], allowed: Mapping[str, str] = NOTHING) -> tuple[Explained, ...]:
+    return tuple(
+        Explained(name=name, meaning=meaning, allowed=allowed.get(name, "")) for name, meaning in meanings.items()
+    )
 
 
 TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
-    "scenario": ("keys of a scenario file: design, start, goal, environment, plan", file_keys.scenario_topic),
-    "vessel": ("keys of a vessel file: particulars, actuators, model, sensors", file_keys.vessel_topic),
-    "card": ("keys of a pilot card, from which expdesign nominal makes a vessel file", file_keys.card_topic),
-    "dictionary": ("keys of a dictionary file", file_keys.dictionary_topic),
+    "scenario": (
+        "keys of a scenario file: design, start, goal, environment, plan",
+        partial(file_topic, "scenario"),
+    ),
+    "vessel": ("keys of a vessel file: particulars, actuators, model, sensors", vessel_topic),
+    "card": (
+        "keys of a pilot card, from which expdesign nominal makes a vessel file",
+        partial(file_topic, "card"),
+    ),
+    "dictionary": ("keys of a dictionary file", dictionary_topic),
     "families": ("manoeuvre families and their settings", families_topic),
-    "area": ("keys of an area file: chart, bounds, depth, no-go zones", file_keys.area_topic),
-    "loads": ("keys of a file of load cases, which expdesign roll reads", file_keys.loads_topic),
+    "area": ("keys of an area file: chart, bounds, depth, no-go zones", partial(file_topic, "area")),
+    "loads": ("keys of a file of load cases, which expdesign roll reads", partial(file_topic, "loads")),
     "data": ("columns of measured data", data_topic),
     "import": ("formats of logs that expdesign import reads", import_topic),
-    "instruments": ("keys of instruments.toml, in which an import says what logs tell", file_keys.instruments_topic),
-    "mapping": ("keys of a mapping file, which says what the channels of logs are", file_keys.mapping_topic),
+    "instruments": (
+        "keys of instruments.toml, in which an import says what logs tell",
+        partial(file_topic, "instruments"),
+    ),
+    "mapping": ("keys of a mapping file, which says what the channels of logs are", mapping_topic),
     "structures": ("built-in model structures and their parameters", structures_topic),
     "criteria": ("design criteria", criteria_topic),
     "outcomes": ("results of standard trials that a design can be optimised for", outcomes_topic),
@@ -216,11 +236,10 @@ def explain(subject: str = "") -> Topic:
     """
     wanted = re.sub(r"\[\d*\]", "", subject)
     if not wanted:
-        pages = tuple(Explained(name=name, meaning=line) for name, line in MANUAL.items())
-        entries = tuple(Explained(name=name, meaning=line) for name, (line, _) in TOPICS.items())
+        lines = {name: line for name, (line, _) in TOPICS.items()}
         text = "expdesign explain TOPIC shows one, expdesign explain NAME a single key, family or other name."
-        manual = Section(name="manual", title="Manual", entries=pages)
-        keys = Section(name="topics", title="Keys of files, and names", entries=entries)
+        manual = Section(name="manual", title="Manual", entries=_entries(MANUAL))
+        keys = Section(name="topics", title="Keys of files, and names", entries=_entries(lines))
         return Topic(name="topics", title="Topics", text=text, sections=(manual, keys))
     if wanted in MANUAL:
         return page(wanted)

@@ -8,8 +8,6 @@ from pathlib import Path
 from expdesign import requests
 from expdesign.errors import FileError, InputError
 from expdesign.export.foresight_page import (
-    ForesightContent,
-    OperationContent,
     foresight_document,
     foresight_json,
     operation_document,
@@ -53,15 +51,11 @@ def foresee(request: requests.Foresee, *, progress: Progress = silent) -> Outcom
             seed=request.seed,
             progress=within(progress, 0.2, 0.95),
         )
-    content = ForesightContent(
-        scenario=case.name,
-        vessel=case.vessel.name,
-        source=OF_PLAN if request.plan else OF_ACCURACY if case.design.accuracy else OF_DESIGN,
-        found=found,
-    )
+    source = OF_PLAN if request.plan else OF_ACCURACY if case.design.accuracy else OF_DESIGN
+    names = {"scenario": case.name, "vessel": case.vessel.name, "source": source}
     progress("writing the page", 0.95)
-    files = {"foresee.json": foresight_json(content)}
-    return written(request, case, files, foresight_document(content), progress, page="foresee.html")
+    files = {"foresee.json": foresight_json(found, **names)}
+    return written(request, case, files, foresight_document(found, **names), progress, page="foresee.html")
 
 
 def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> Outcome:
@@ -71,9 +65,9 @@ def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> O
         found = foresee_operation(
             case.vessel, case.environment, voyages=voyages, seed=request.seed, progress=within(progress, 0.02, 0.97)
         )
-    content = OperationContent(scenario=case.name, vessel=case.vessel.name, found=found)
-    files = {"operation.json": operation_json(content)}
-    return written(request, case, files, operation_document(content), progress, page="operation.html")
+    files = {"operation.json": operation_json(found, vessel=case.vessel.name)}
+    document = operation_document(found, scenario=case.name, vessel=case.vessel.name)
+    return written(request, case, files, document, progress, page="operation.html")
 
 
 def _trial(

@@ -20,7 +20,7 @@ from expdesign.dictionary import PrimitiveSpec, build_primitive
 from expdesign.errors import InputError, NoAnswer
 from expdesign.export.document import Document
 from expdesign.export.folder import write_files
-from expdesign.export.nominal_page import NominalContent, nominal_toml
+from expdesign.export.nominal_page import nominal_toml
 from expdesign.particulars import Card, nominal
 from expdesign.particulars.forces import design_speed
 from expdesign.plan.control import capability
@@ -160,7 +160,7 @@ def of_card(name: str, kind: str, card: Card, *, command: str, progress: Progres
     ship = f"{card.name}, {vessel.length_m:g} m"
     texts = {
         "scenario": scenario.replace("[design]\n", PRIOR),
-        "vessel": nominal_toml(NominalContent(nominal=replace(found, vessel=vessel), command=command)),
+        "vessel": nominal_toml(replace(found, vessel=vessel), command),
         "dictionary": candidates,
     }
     said = f"{ship}, from her card, in an invented bay; candidates are scaled to her length and speed"

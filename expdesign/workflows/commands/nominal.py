@@ -6,7 +6,7 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.export.folder import Content
-from expdesign.export.nominal_page import NominalContent, nominal_document, nominal_json, nominal_toml
+from expdesign.export.nominal_page import nominal_document, nominal_json, nominal_toml
 from expdesign.particulars import nominal as fitted
 from expdesign.progress import Progress, silent
 from expdesign.requests import repeating
@@ -23,14 +23,10 @@ def nominal(request: requests.Nominal, *, progress: Progress = silent) -> Outcom
     """
     progress("reading the card", 0.0)
     found = fitted(load_card(request.card), seed=request.seed, progress=progress)
-    content = NominalContent(
-        nominal=found, command=repeating(request),
-    )  # fmt: skip
-    document = nominal_document(content)
+    command = repeating(request)
     files: dict[str, Content] = {
-        "vessel.toml": nominal_toml(content),
-        "nominal.json": nominal_json(content),
+        "vessel.toml": nominal_toml(found, command),
+        "nominal.json": nominal_json(found, command),
     }
-    return finished(
-        request, Path("runs") / f"{request.card.stem}-nominal", files, document, progress, page="nominal.html"
-    )
+    usual = Path("runs") / f"{request.card.stem}-nominal"
+    return finished(request, usual, files, nominal_document(found), progress, page="nominal.html")

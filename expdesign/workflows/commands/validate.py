@@ -14,7 +14,7 @@ from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
 from expdesign.export.files import vessel_toml
 from expdesign.export.folder import Content
-from expdesign.export.validation_page import ValidationContent, validation_document, validation_json
+from expdesign.export.validation_page import judgements, validation_document, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
@@ -66,20 +66,16 @@ def validate_design(request: requests.Validate, *, progress: Progress = silent) 
     done, keep, forget = _chunk_store(folder / f".validation-{joblib.hash(_identity(rehearsal))}")
     with shared(request, load=None):
         results = validate(rehearsal, done=done, keep=keep, progress=within(progress, 0.05, 0.95))
-    content = ValidationContent(
-        scenario=case.name,
-        rehearsal=rehearsal,
-        results=results,
-        noisy_moduli=tuple(
-            item.primitive.name
-            for item, count in zip(information, design.repeats, strict=True)
-            if count and not item.excitation_condition
-        ),
-    )
-    document = validation_document(content)
+    noisy = [
+        item.primitive.name
+        for item, count in zip(information, design.repeats, strict=True)
+        if count and not item.excitation_condition
+    ]
+    judged = judgements(rehearsal, results, noisy_moduli=noisy)
     files: dict[str, Content] = {
-        "validation.json": validation_json(content),
+        "validation.json": validation_json(rehearsal, results, scenario=case.name, judged=judged),
     }
+    document = validation_document(rehearsal, results, scenario=case.name, judged=judged)
     outcome = finished(request.but(method=method), folder, files, document, progress, page="validation.html")
     forget()
     return outcome

@@ -173,11 +173,20 @@ REFUSED = (
 )
 
 
-def scenario_topic() -> Topic:
-    """Keys of a scenario file."""
-    return Topic(
-        name="scenario", title="Scenario files", text=f"{VARIANTS} {REFUSED}", sections=_by_table(ScenarioFile)
-    )
+KEYS_ALONE: dict[str, tuple[str, str, type[Table]]] = {
+    "scenario": ("Scenario files", f"{VARIANTS} {REFUSED}", ScenarioFile),
+    "card": ("Pilot cards", CARDS, CardFile),
+    "area": ("Area files", AREAS, AreaTable),
+    "loads": ("Files of load cases", LOADS, LoadsFile),
+    "instruments": ("instruments.toml", INSTRUMENTS_TEXT, InstrumentsFile),
+}
+"""Topic of a file that has nothing but its keys -> title, text and the table that reads it."""
+
+
+def file_topic(name: str) -> Topic:
+    """Keys of a file."""
+    title, text, table = KEYS_ALONE[name]
+    return Topic(name=name, title=title, text=text, sections=_by_table(table))
 
 
 def vessel_topic() -> Topic:
@@ -186,18 +195,11 @@ def vessel_topic() -> Topic:
         _with_more(section, ActuatorTable) if section.name == "actuators" else section
         for section in _by_table(VesselTable)
     ]
-    kinds = [_kind(names, table) for table, names in _kinds().items()]
+    by_table: dict[type[Table], list[str]] = {}
+    for kind, table in ACTUATOR_TABLES.items():
+        by_table.setdefault(table, []).append(kind)
+    kinds = [_kind(names, table) for table, names in by_table.items()]
     return Topic(name="vessel", title="Vessel files", text=VESSELS, sections=(*sections[:2], *kinds, *sections[2:]))
-
-
-def card_topic() -> Topic:
-    """Keys of a pilot card."""
-    return Topic(name="card", title="Pilot cards", text=CARDS, sections=_by_table(CardFile))
-
-
-def loads_topic() -> Topic:
-    """Keys of a file of load cases."""
-    return Topic(name="loads", title="Files of load cases", text=LOADS, sections=_by_table(LoadsFile))
 
 
 def mapping_topic() -> Topic:
@@ -207,13 +209,6 @@ def mapping_topic() -> Topic:
     )
     more = Section(name="columns", title="columns beside those of expdesign explain data", entries=beside)
     return Topic(name="mapping", title="Mapping files", text=MAPPINGS, sections=(*_by_table(MappingFile), more))
-
-
-def instruments_topic() -> Topic:
-    """Keys of what an import leaves beside its runs."""
-    return Topic(
-        name="instruments", title="instruments.toml", text=INSTRUMENTS_TEXT, sections=_by_table(InstrumentsFile)
-    )
 
 
 def dictionary_topic() -> Topic:
@@ -228,22 +223,9 @@ def dictionary_topic() -> Topic:
     )
 
 
-def area_topic() -> Topic:
-    """Keys of an area file."""
-    return Topic(name="area", title="Area files", text=AREAS, sections=_by_table(AreaTable))
-
-
 def _with_more(section: Section, model: type[Table]) -> Section:
     """A list of tables with the keys that all of them have."""
     return replace(section, entries=(*section.entries, *keys_of(model, f"{section.name}[].")))
-
-
-def _kinds() -> dict[type[Table], list[str]]:
-    """Kinds of actuators by the table that reads them."""
-    kinds: dict[type[Table], list[str]] = {}
-    for kind, table in ACTUATOR_TABLES.items():
-        kinds.setdefault(table, []).append(kind)
-    return kinds
 
 
 def _kind(names: Sequence[str], table: type[Table]) -> Section:
