@@ -44,7 +44,7 @@ def tug_commands(samples: int = 3000, *, seed: int = 0) -> Commands:
     rng = np.random.default_rng(seed)
     speed, one, two = (held(rng, samples) for _ in range(3))
     orders = np.stack([10 + 3 * speed, 0.63 + 0.4 * one, 10 + 3 * speed, 0.63 + 0.4 * two], axis=1)
-    values = positions(TUG_TRUE.responses, orders, sample_time_s=1.0, standing=None).means
+    values, _ = positions(TUG_TRUE.responses, orders, sample_time_s=1.0, standing=None)
     return Commands(sample_time_s=1.0, names=TUG_TRUE.model.inputs, values=values)
 
 

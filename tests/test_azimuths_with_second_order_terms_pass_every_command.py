@@ -109,7 +109,7 @@ def test_the_watch_takes_them_and_is_silent_on_the_ship_of_its_reference(trial: 
         samples, rng = int(3600 * hours), np.random.default_rng(seed)
         speed, one, two, tunnel = (held(rng, samples) for _ in range(4))
         orders = np.stack([2.5 + 0.5 * speed, 0.3 * one, 2.5 + 0.5 * speed, 0.3 * two, 3.0 * tunnel], axis=1)
-        values = positions(vessel.responses, orders, sample_time_s=1.0, standing=None).means
+        values, _ = positions(vessel.responses, orders, sample_time_s=1.0, standing=None)
         commands = Commands(sample_time_s=1.0, names=vessel.model.inputs, values=values)
         write_run(trial / f"{name}.csv", vessel, commands, velocity=(3.0, 0.0, 0.0), seed=seed)
     out = asked(trial, "monitor", "watched", options=f"--reference {trial / 'known.csv'}")

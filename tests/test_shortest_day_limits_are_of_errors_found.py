@@ -57,7 +57,7 @@ def test_what_the_reference_leaves_is_forecast_of_it(reference):
 @pytest.mark.thorough
 def test_an_outcome_is_as_uncertain_as_errors_along_its_gradient(reference):
     case, design, _, told, covariance = reference
-    gradient = outcome_gradients(case.vessel, ("advance_m",), design.problem.parameters).gradients[0]
+    gradient = outcome_gradients(case.vessel, ("advance_m",), design.problem.parameters)[1][0]
     half = NORMAL_95 * np.sqrt(gradient @ covariance @ gradient)
     asked = accuracy(reference, AccuracySettings(outcomes_95={"advance_m": float(half)}))
     assert asked.margin(told) == pytest.approx(0.0, abs=1e-9)

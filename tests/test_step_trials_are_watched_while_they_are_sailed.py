@@ -169,8 +169,8 @@ def test_what_is_left_of_a_broken_trial_is_a_list_of_steps_with_their_numbers(sa
     assert done
     assert to_do
     assert sorted(done + to_do) == [1, 2, 3, 4, 5]
-    again = read_levels(sailed / "out" / "steps-to-do.csv", inputs=INPUTS)
-    listed = step_list(INPUTS, again.values, controls_of(INPUTS), numbers=again.numbers)
+    values, _, numbers = read_levels(sailed / "out" / "steps-to-do.csv", inputs=INPUTS)
+    listed = step_list(INPUTS, values, controls_of(INPUTS), numbers=numbers)
     assert [step.number for step in listed.steps] == to_do
     places = [step.number for step in listed.steps]
     assert [(step.before, step.after) for step in listed.steps] == [(SHORT[k - 1], SHORT[k]) for k in places]

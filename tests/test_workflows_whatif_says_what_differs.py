@@ -32,10 +32,10 @@ def cases(outcome) -> dict[str, dict]:
 
 @pytest.mark.parametrize("path", VARIANTS, ids=lambda path: path.stem)
 def test_the_example_variants_change_what_they_say(path):
-    found = load_variant(HOUR, path)
-    assert found.scenario.name == path.stem
-    assert found.changes
-    assert found.scenario.area.name == load_scenario(HOUR).area.name
+    scenario, changes = load_variant(HOUR, path)
+    assert scenario.name == path.stem
+    assert changes
+    assert scenario.area.name == load_scenario(HOUR).area.name
 
 
 @pytest.mark.thorough
@@ -67,29 +67,29 @@ def test_twice_the_time_is_twice_the_information_and_the_same_files_give_no_diff
 def test_a_complete_scenario_is_a_variant_too_and_relative_files_are_found(tmp_path):
     write_scenario(tmp_path)
     own = tmp_path / "scenario.toml"
-    found = load_variant(MODEL_SHIP, own)
+    scenario, _ = load_variant(MODEL_SHIP, own)
     alone = load_scenario(own)
-    assert found.scenario.name == alone.name
-    assert np.array_equal(found.scenario.start, alone.start)
-    assert found.scenario.vessel.name == alone.vessel.name
+    assert scenario.name == alone.name
+    assert np.array_equal(scenario.start, alone.start)
+    assert scenario.vessel.name == alone.vessel.name
 
 
 def test_a_complete_scenario_takes_nothing_from_its_base_and_what_it_leaves_out_is_said():
     shortest = SCENARIOS / "helsinki.toml"
     assert load_scenario(shortest).design.accuracy is not None
-    found = load_variant(shortest, HOUR)
-    assert found.scenario.design.accuracy is None
-    assert any(line.startswith("design.accuracy") and "not given instead of" in line for line in found.changes)
-    assert load_variant(HOUR, HOUR).changes == ()
+    scenario, changes = load_variant(shortest, HOUR)
+    assert scenario.design.accuracy is None
+    assert any(line.startswith("design.accuracy") and "not given instead of" in line for line in changes)
+    assert load_variant(HOUR, HOUR)[1] == ()
 
 
 def test_a_position_in_other_keys_replaces_the_first(tmp_path):
     moved = variant(tmp_path, "moved", "[start]\nheading_deg = 10.0\n")
-    assert load_variant(MODEL_SHIP, moved).scenario.start[2] == pytest.approx(np.radians(10.0))
+    assert load_variant(MODEL_SHIP, moved)[0].start[2] == pytest.approx(np.radians(10.0))
     base = load_scenario(MODEL_SHIP)
     lat, lon = base.area.frame.to_degrees(base.start[:2])
     other = variant(tmp_path, "other", f"[start]\nlat_deg = {lat:.9f}\nlon_deg = {lon:.9f}\n")
-    assert np.allclose(load_variant(MODEL_SHIP, other).scenario.start, base.start, atol=1e-3)
+    assert np.allclose(load_variant(MODEL_SHIP, other)[0].start, base.start, atol=1e-3)
 
 
 def test_a_variant_without_answer_is_listed_beside_the_others(tmp_path):
@@ -200,7 +200,7 @@ def test_where_legs_count_whole_days_are_compared_and_not_runs():
 def test_what_a_case_does_not_use_is_said_of_it_and_of_all_only_once(tmp_path, capsys):
     calm = variant(tmp_path, "windy", "[environment]\nwind_to = {north_mps = 5.0, east_mps = 0.0}\n")
     assert main(["whatif", str(MODEL_SHIP), str(calm), "--jobs", "1", "--out", str(tmp_path / "out")]) == 0
-    (wind,) = (line for line in load_variant(MODEL_SHIP, calm).scenario.remarks if "wind" in line)
+    (wind,) = (line for line in load_variant(MODEL_SHIP, calm)[0].remarks if "wind" in line)
     told, page = capsys.readouterr().out, (tmp_path / "out" / "whatif.html").read_text(encoding="utf-8")
     assert load_scenario(MODEL_SHIP).remarks == ()
     for text in (told, page.replace("&#39;", "'")):

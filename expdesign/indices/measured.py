@@ -75,15 +75,12 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     astern = _astern(run)
     if astern is None:
         return NotStandard(name=batch.name, reason=f"{helm}, and the engines are not ordered to stop")
-    approach = _approach(run, astern)
-    found = read_stop(
-        run, order_s=astern, course_rad=approach.course_rad, speed_mps=approach.speed_mps,
-        rest_mps=AT_REST * approach.speed_mps,
-    )  # fmt: skip
-    if found is None or approach.speed_mps < _slow(run):
+    course, speed, remarks = _approach(run, astern)
+    found = read_stop(run, order_s=astern, course_rad=course, speed_mps=speed, rest_mps=AT_REST * speed)
+    if found is None or speed < _slow(run):
         last = f"makes {run.velocity[-1, 0]:.2g} m/s ahead where the record ends"
         return NotStandard(name=batch.name, reason=f"{helm}, and the ship {last}")
-    return replace(found, remarks=(*approach.remarks, _over_ground("track reach and head reach", found.time_s)))
+    return replace(found, remarks=(*remarks, _over_ground("track reach and head reach", found.time_s)))
 
 
 def _steered_run(vessel: Vessel, batch: Batch, forward_m: float) -> SteeredRun:
@@ -200,13 +197,12 @@ def _left(run: SteeredRun, first: int, arrived: int, before: float, after: float
 
 def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
     times = tuple(stretch.order_s for stretch in held if stretch.order_s is not None)
-    approach = _approach(run, times[0])
-    course, speed = approach.course_rad, approach.speed_mps
+    course, speed, approach = _approach(run, times[0])
     if speed < _slow(run):
         return NotStandard(name=run.name, reason=f"the ship makes {speed:.3g} m/s when the helm is ordered")
     swung = run.at(times[1] if len(times) > 1 else float(run.time_s[-1]))[2] - course
     side = 1 if swung > 0 else -1
-    remarks = approach.remarks + _against(vessel, side, held[0])
+    remarks = approach + _against(vessel, side, held[0])
     if len(held) == 1:
         if abs(swung) < TURNED_RAD:
             reason = f"one helm order, and the heading changes by {_degrees(swung)} only"
@@ -315,16 +311,8 @@ def _against(vessel: Vessel, side: int, held: _Held) -> tuple[str, ...]:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Approach:
-    """Mean heading and speed over the last ship length before an order, or over the part of it that was recorded."""
-
-    course_rad: float
-    speed_mps: float
-    remarks: tuple[str, ...]
-
-
-def _approach(run: SteeredRun, order_s: float) -> _Approach:
+def _approach(run: SteeredRun, order_s: float) -> tuple[float, float, tuple[str, ...]]:
+    """Mean heading and speed over the last ship length before an order, or what of it was recorded; and remarks."""
     speeds = np.hypot(*run.velocity[:, :2].T)
     before = np.flatnonzero(run.time_s <= order_s)
     last = float(speeds[before[-1]])
@@ -338,9 +326,7 @@ def _approach(run: SteeredRun, order_s: float) -> _Approach:
     start, end = (float(speeds[part].mean()) for part in (stretch[:third], stretch[-third:]))
     if abs(end - start) > STEADY_APPROACH * (end + start) / 2:
         remarks.append(f"the approach is not steady: {start:.3g} m/s becomes {end:.3g} m/s over the last ship length")
-    return _Approach(
-        course_rad=float(run.pose[stretch, 2].mean()), speed_mps=float(speeds[stretch].mean()), remarks=tuple(remarks)
-    )
+    return float(run.pose[stretch, 2].mean()), float(speeds[stretch].mean()), tuple(remarks)
 
 
 def _slow(run: SteeredRun) -> float:

@@ -14,23 +14,11 @@ from expdesign.indices.read import read_circle, read_stop, read_zigzag, steered_
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Conduct, stopping, turning_circle, zigzag
 from expdesign.simulation.helm import steady_ahead
-from expdesign.values import Array, seal
+from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 PARAMETER_STEP = 1e-3  # relative step of central differences in a parameter
 GRADIENT_AGREEMENT = 0.05  # change of a gradient when the step is halved, relative to the outcome's largest gradient
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class OutcomeGradients:
-    """Outcomes and their gradients."""
-
-    names: tuple[str, ...]  # of the outcomes
-    values: Array  # (o,) at the nominal parameters
-    gradients: Array  # (o, p) derivative by each parameter
-
-    def __post_init__(self) -> None:
-        seal(self, values="o", gradients="o p")
 
 
 def outcome_gradients(
@@ -40,8 +28,8 @@ def outcome_gradients(
     *,
     speed_mps: float | None = None,
     progress: Progress = silent,
-) -> OutcomeGradients:
-    """Gradients of named outcomes by named parameters, at the nominal model.
+) -> tuple[Array, Array]:
+    """Named outcomes (o,) at the nominal model, and their gradients (o, p) by named parameters.
 
     Args:
         vessel: nominal.
@@ -69,7 +57,7 @@ def outcome_gradients(
         slopes.append(_slopes(found, theta, index, sizes[-1]))
     coarse, fine = np.array(slopes).transpose(1, 2, 0)  # (o, p) each
     _check_smooth(coarse * sizes, fine * sizes, names, parameters)
-    return OutcomeGradients(names=tuple(names), values=base, gradients=(4 * fine - coarse) / 3)
+    return base, (4 * fine - coarse) / 3
 
 
 def _slopes(found: Callable[[Array], Array], theta: Array, index: int, size: float) -> list[Array]:

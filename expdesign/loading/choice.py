@@ -19,8 +19,9 @@ Identification (1999), 15.3, for the covariance of the best instruments.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -311,11 +312,11 @@ def choose_loads(
         pieces.append(run_information(question.vessel, question.theta, option, primitives))
     scale = np.outer(question.size, question.size)
     matrices = np.array(pieces)[:, :, question.places][..., question.places] * scale
-    problems = _Problems(question, primitives, matrices, total_s, aim)
-    steps = _fewer(question, problems, everything, progress)
+    of_loads = partial(_problem, question, primitives, matrices, total_s, aim)
+    steps = _fewer(question, of_loads, everything, progress)
     chosen = _followed(question, steps, most_loads)
     progress("choosing whole runs", 0.95)
-    design = solve_durations(problems.of(chosen.options))
+    design = solve_durations(of_loads(chosen.options))
     repeats = np.array(design.repeats).reshape(len(chosen.options), len(primitives))
     _check_runs(question, chosen, repeats, total_s)
     information = question.prior + np.einsum("lq,lqij->ij", repeats, matrices[list(chosen.options)])
@@ -351,31 +352,25 @@ def _std(information: Array) -> Array:
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class _Problems:
-    """Duration problems of some of the loads; `matrices` are (o, q, p, p) of one run each."""
-
-    question: Question
-    primitives: Sequence[Primitive]
-    matrices: Array
-    total_s: float
-    aim: Aim
-
-    def of(self, options: Sequence[int]) -> DurationProblem:
-        run_s = np.array([item.duration_s for item in self.primitives])
-        rate = self.matrices[list(options)] * (self.total_s / run_s)[:, None, None]
-        rate = (rate + rate.swapaxes(-1, -2)) / 2
-        names = [self.question.options[place].name for place in options]
-        return DurationProblem(
-            names=tuple(f"{item.name} with {name}" for name in names for item in self.primitives),
-            parameters=self.question.free,
-            mean_subtraction="none",
-            matrices=rate.reshape(-1, *rate.shape[2:]),
-            run_s=np.tile(run_s, len(names)),
-            total_s=self.total_s,
-            aim=self.aim,
-            prior=self.question.prior,
-        )
+def _problem(
+    question: Question, primitives: Sequence[Primitive], matrices: Array, total_s: float, aim: Aim,
+    options: Sequence[int],
+) -> DurationProblem:  # fmt: skip
+    """The duration problem of some of the loads; `matrices` are (o, q, p, p) of one run with each load."""
+    run_s = np.array([item.duration_s for item in primitives])
+    rate = matrices[list(options)] * (total_s / run_s)[:, None, None]
+    rate = (rate + rate.swapaxes(-1, -2)) / 2
+    names = [question.options[place].name for place in options]
+    return DurationProblem(
+        names=tuple(f"{item.name} with {name}" for name in names for item in primitives),
+        parameters=question.free,
+        mean_subtraction="none",
+        matrices=rate.reshape(-1, *rate.shape[2:]),
+        run_s=np.tile(run_s, len(names)),
+        total_s=total_s,
+        aim=aim,
+        prior=question.prior,
+    )
 
 
 def _sensed(question: Question, options: Sequence[int]) -> tuple[Array, tuple[Direction, ...]]:
@@ -401,9 +396,12 @@ def _check_rank(question: Question, options: Sequence[int]) -> None:
     )
 
 
-def _fewer(question: Question, problems: _Problems, options: tuple[int, ...], progress: Progress) -> tuple[Step, ...]:
+def _fewer(
+    question: Question, of_loads: Callable[[Sequence[int]], DurationProblem], options: tuple[int, ...],
+    progress: Progress,
+) -> tuple[Step, ...]:  # fmt: skip
     """Steps from all loads down, each without the load that is missed least."""
-    best = optimal_shares(problems.of(options)).certificate
+    best = optimal_shares(of_loads(options)).certificate
     steps = [Step(options=options, efficiency=1.0, smallest=float(_sensed(question, options)[0][-1]))]
     while len(options) > 1:
         progress(f"leaving loads out, {len(options)} left", 0.4 + 0.5 / len(options))
@@ -412,7 +410,7 @@ def _fewer(question: Question, problems: _Problems, options: tuple[int, ...], pr
             rest = tuple(place for place in options if place != gone)
             sizes, left = _sensed(question, rest)
             if not left:
-                gained = (optimal_shares(problems.of(rest)).certificate.value - best.value) / best.degree
+                gained = (optimal_shares(of_loads(rest)).certificate.value - best.value) / best.degree
                 found.append(Step(options=rest, efficiency=float(np.exp(gained)), smallest=float(sizes[-1])))
         if not found:
             break

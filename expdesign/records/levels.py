@@ -4,34 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.records.file import FIRST_ROW, Source, meaning, mistyped, read_cells
-from expdesign.values import Array, seal
+from expdesign.values import Array
 from expdesign.vessel import column_name
 
 NUMBER = "step"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Levels:
-    """Rows of commands."""
-
-    values: Array  # (k, m) in the order of the inputs asked for, in SI units
-    time_s: Array | None = None  # (k,) of the rows [s], None for a list without times
-    # of the step that each row is, None where its cell is empty; None for a list without such a column
-    numbers: tuple[int | None, ...] | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, values="k m")
+Levels = tuple[Array, Array | None, tuple[int | None, ...] | None]
 
 
 def read_levels(path: Path, *, inputs: Sequence[str]) -> Levels:
     """Read commands from a CSV file with a column for every input, and `time_s` or `step` where there is one.
+
+    Returns:
+        Commands (k, m) in the order of the inputs, in SI units; times (k,) of the rows [s], None for a list without;
+        and the step that each row is, None where its cell is empty, or None for a list without such a column.
 
     Raises:
         FileError: unreadable, without a column for every input, or with cells that are no numbers.
@@ -54,7 +47,7 @@ def read_levels(path: Path, *, inputs: Sequence[str]) -> Levels:
         if steps is None or time_s is not None
         else tuple(_count(path, row[steps], k) for k, row in enumerate(rows))
     )
-    return Levels(values=values, time_s=time_s, numbers=numbers)
+    return values, time_s, numbers
 
 
 def _numbers(path: Path, rows: Sequence[Sequence[str]], source: Source) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -271,31 +270,20 @@ def _batches(
 ) -> tuple[list[Batch], tuple[str, ...]]:
     """The batches of one file, and all notes on it."""
     origins = velocity_origins(table, request)
-    file = _File(table, clock, request, origins, inputs)
     parts = long_enough(clock.batches, origins)
     if not parts:
         raise table.error("time_s", "leaves no batch long enough to derive velocities in, expected 4 samples in a row")
     batches = [
-        _batch(file, part, f"{name}, batch {index}" if len(parts) > 1 else name)
+        _batch(table, clock, request, origins, inputs, part, f"{name}, batch {index}" if len(parts) > 1 else name)
         for index, part in enumerate(parts, start=1)
     ]
     left_out = left_out_notes(table, clock.batches, parts)
     return batches, (*table.notes, *left_out, *origin_notes(origins), *motion_remarks(batches, origins))
 
 
-@dataclass(frozen=True, eq=False)
-class _File:
-    """A file with everything that its batches are made from."""
-
-    table: Table
-    clock: Clock
-    request: Request
-    origins: Mapping[str, str]
-    inputs: Inputs
-
-
-def _batch(file: _File, part: slice, name: str) -> Batch:
-    table, clock, inputs, origins = file.table, file.clock, file.inputs, file.origins
+def _batch(
+    table: Table, clock: Clock, request: Request, origins: Mapping[str, str], inputs: Inputs, part: slice, name: str
+) -> Batch:
     kept = kept_samples(part, origins)
     wind, depth, steered = relative_wind(table), table.columns.get("depth_m"), table.columns.get(STEERED)
     planned = [PLANNED + column for column in inputs.columns if PLANNED + column in table.columns]
@@ -305,7 +293,7 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
         sample_time_s=clock.sample_time_s,
         input_names=names,
         inputs=_inputs(table, inputs.columns, part)[kept.start - part.start :][: kept.stop - kept.start],
-        velocity=batch_velocity(table, part, clock.sample_time_s, origins, file.request.heading_std_rad),
+        velocity=batch_velocity(table, part, clock.sample_time_s, origins, request.heading_std_rad),
         pose=table.stack(*POSE_COLUMNS)[kept] if set(POSE_COLUMNS) & set(table.columns) else None,
         wind=wind[kept] if wind is not None else None,
         depth_m=depth[kept] if depth is not None else None,

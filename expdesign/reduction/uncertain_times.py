@@ -111,7 +111,7 @@ def delivered_with_slopes(
             None if responses[column].follows and column not in moved else through
             for column, through in enumerate(parts.maps(own, sample_time_s))
         ]
-        acting = positions(own, commands, sample_time_s=sample_time_s, standing=standing).means
+        acting, _ = positions(own, commands, sample_time_s=sample_time_s, standing=standing)
         return deliver_through(maps, acting, len(shares), standing=standing), shares
 
     moved, slopes = {time.column for time in times if time.quantity != "rate"}, []

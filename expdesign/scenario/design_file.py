@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from expdesign.durations import Budget
 from expdesign.errors import FileError, nearest
 from expdesign.indices import OUTCOMES
 from expdesign.input_files import check_ends
 from expdesign.scenario.design_tables import LONGEST_TOTAL_S, AccuracyTable, BudgetTable, DesignTable, build_grow
-from expdesign.scenario.tables import Entry, shown
-from expdesign.scenario.values import BudgetSettings, DesignSettings
+from expdesign.scenario.tables import Entry, same_keys, shown
+from expdesign.scenario.values import DesignSettings
 from expdesign.shortest_day import AccuracySettings
 from expdesign.vessel import Vessel
 
@@ -78,35 +79,15 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         _check_list(getattr(table, key), primitives, entry.at(key))
     _check_together(table, vessel, entry)
     _check_causes(table, vessel, entry)
-    return DesignSettings(
-        total_s=table.total_s,
-        criterion=table.criterion,
-        mean_subtraction=table.mean_subtraction,
-        fixed_parameters=tuple(table.fixed_parameters),
-        interest=tuple(table.interest),
-        relative_to=table.relative_to,
-        parameter_units=dict(table.parameter_units),
-        outcomes=tuple(table.outcomes),
-        outcome_units=dict(table.outcome_units),
-        outcome_speed_mps=table.outcome_speed_mps,
-        predictor=table.predictor,
-        excitation=table.excitation,
-        robust=table.robust,
-        prior_samples=(table.prior_samples or 20) if table.robust != "nominal" else 0,
-        prior=table.prior,
-        prior_data=named_files(table.prior_data, entry.at("prior_data")),
-        least_s=dict(table.least_s),
-        most_s=dict(table.most_s),
-        required=tuple(table.required),
-        excluded=tuple(table.excluded),
-        budgets=_budgets(table.budgets, primitives, entry.at("budgets")),
-        balance=table.balance,
-        reveal=tuple(table.reveal),
-        tell_apart=tuple((one, other) for one, other in table.tell_apart),
-        reveal_sizes=dict(table.reveal_sizes),
-        grow=None if table.grow is None else build_grow(table.grow, entry.at("grow")),
-        accuracy=_asked(table, vessel, estimated, entry),
-    )
+    own = {
+        "prior_samples": (table.prior_samples or 20) if table.robust != "nominal" else 0,
+        "prior_data": named_files(table.prior_data, entry.at("prior_data")),
+        "budgets": _budgets(table.budgets, primitives, entry.at("budgets")),
+        "tell_apart": tuple((one, other) for one, other in table.tell_apart),
+        "grow": None if table.grow is None else build_grow(table.grow, entry.at("grow")),
+        "accuracy": _asked(table, vessel, estimated, entry),
+    }
+    return DesignSettings(**same_keys(table, DesignSettings) | own)
 
 
 def _asked(table: DesignTable, vessel: Vessel, estimated: tuple[str, ...], entry: Entry) -> AccuracySettings | None:
@@ -139,16 +120,8 @@ def _accuracy(
             raise entry.at("relative_std").error(f"names {name!r}, which std names too; expected it once")
         if nominal[name] == 0:
             raise entry.at("relative_std").error(f"names {name!r}, whose nominal value is 0; expected it in std")
-    return AccuracySettings(
-        as_durations=table.as_ is not None,
-        std=dict(table.std),
-        relative_std=dict(table.relative_std),
-        outcomes_95=dict(table.outcomes_95),
-        outcome_speed_mps=speed_mps,
-        most_s=table.most_s,
-        grow=table.grow,
-        starts=table.starts,
-    )
+    own = {"as_durations": table.as_ is not None, "outcome_speed_mps": speed_mps}
+    return AccuracySettings(**same_keys(table, AccuracySettings) | own)
 
 
 def _check_fixed(table: DesignTable, names: tuple[str, ...], entry: Entry) -> None:
@@ -227,18 +200,18 @@ def _check_together(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
             raise entry.at("excluded").error(f"names {name!r}, which design.required names too")
 
 
-def _budgets(tables: list[BudgetTable], primitives: tuple[str, ...], entry: Entry) -> tuple[BudgetSettings, ...]:
+def _budgets(tables: list[BudgetTable], primitives: tuple[str, ...], entry: Entry) -> tuple[Budget, ...]:
     for index, table in enumerate(tables, start=1):
         if table.name in [other.name for other in tables[: index - 1]]:
             raise entry.item(index).at("name").error(f"is {table.name!r} again, expected a name not used before")
     return tuple(_budget(table, primitives, entry.item(index)) for index, table in enumerate(tables, start=1))
 
 
-def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> BudgetSettings:
+def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> Budget:
     _check_keys(table.cost_per_s, primitives, entry.at("cost_per_s"))
     if bool(table.cost_per_s) == bool(table.use):
         raise entry.error("needs either cost_per_s by primitive or use = 'cubed_propeller_speed'")
-    return BudgetSettings(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s))
+    return Budget(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s))
 
 
 def named_files(given: list[str], entry: Entry) -> tuple[Path, ...]:

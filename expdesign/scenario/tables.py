@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
@@ -45,6 +45,12 @@ class Table(BaseModel):
 
 
 T = TypeVar("T", bound=Table)
+
+
+def same_keys(table: Table, kind: type) -> dict[str, Any]:
+    """What a table says of the fields of a dataclass that have the names of its keys; lists are tuples."""
+    given = {item.name: getattr(table, item.name) for item in fields(kind) if item.name in type(table).model_fields}
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
 
 
 @dataclass(frozen=True)

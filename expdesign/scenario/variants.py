@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +11,16 @@ from expdesign.scenario.tables import Entry, read_toml, shown
 from expdesign.scenario.values import Scenario
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Variant:
-    """A changed scenario and its changes."""
-
-    scenario: Scenario  # complete
-    changes: tuple[str, ...]  # one line for each entry that differs, e.g. "design.total_s = 1800 instead of 3600".
-
-
-def load_variant(base: Path | str, variant: Path | str) -> Variant:
+def load_variant(base: Path | str, variant: Path | str) -> tuple[Scenario, tuple[str, ...]]:
     """A scenario file with entries replaced by those of another file.
 
     Args:
         base: a scenario file.
         variant: a TOML file with any of a scenario's tables and keys, or a whole scenario file, which takes nothing
             from the base. It is named by its own `scenario.name`, or by its file name.
+
+    Returns:
+        The scenario, and one line for each entry that differs, e.g. "design.total_s = 1800 instead of 3600".
 
     Raises:
         FileError, NoPlan: as for `load_scenario`; wrong entries are reported with the variant's path.
@@ -41,7 +35,7 @@ def load_variant(base: Path | str, variant: Path | str) -> Variant:
     )
     if isinstance(merged.get("scenario"), dict):
         merged["scenario"] = {**merged["scenario"], "name": named}
-    return Variant(scenario=build_scenario(merged, entry), changes=changed_entries(first, over))
+    return build_scenario(merged, entry), changed_entries(first, over)
 
 
 def _absolute(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:

@@ -107,9 +107,8 @@ def asked_limits(settings: AccuracySettings, design: DurationDesign, vessel: Ves
     slopes, stds = [np.eye(len(parameters))[[parameters.index(name) for name in names]]], [asked[n] for n in names]
     outcomes: tuple[str, ...] = ()
     if settings.outcomes_95:
-        found = outcome_gradients(vessel, tuple(settings.outcomes_95), parameters, speed_mps=settings.outcome_speed_mps)
-        outcomes = found.names
-        slopes.append(found.gradients)
+        outcomes = tuple(settings.outcomes_95)
+        slopes.append(outcome_gradients(vessel, outcomes, parameters, speed_mps=settings.outcome_speed_mps)[1])
         stds += [settings.outcomes_95[name] / NORMAL_95 for name in outcomes]
     p, sure = len(parameters), np.where(noise > 0, noise, np.inf)
     return Limits(

@@ -138,8 +138,12 @@ def moved(position: Any, goal: Any, reach: Any) -> tuple[Array, Array]:
 
 def positions(
     responses: Sequence[Response], commands: Array, *, sample_time_s: float, standing: Array | None
-) -> Slewed:
-    """Where actuators stand that move towards their commands (k, m, ...) at their slew rates; see `deliver`."""
+) -> tuple[Array, Array]:
+    """Where actuators stand that move towards their commands (k, m, ...) at their slew rates; see `deliver`.
+
+    Returns:
+        (k, m, ...) means over each sample, and positions at its end; both the commands where these keep to the rates.
+    """
     before = commands[0] if standing is None else standing
     means, ends = commands, commands
     for column, response in enumerate(responses):
@@ -153,15 +157,7 @@ def positions(
             means, ends = np.array(commands, dtype=float), np.array(commands, dtype=float)
         rows = np.flatnonzero(faster.reshape(len(commands), -1).any(axis=1)).tolist()
         means[:, column], ends[:, column] = _slewed(commands[:, column], previous, rows, reach)
-    return Slewed(means=means, ends=ends)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Slewed:
-    """Positions of actuators that move at their slew rates."""
-
-    means: Array  # (k, m, ...) over each sample; the commands themselves where these keep to the rates
-    ends: Array  # (k, m, ...) at the end of each sample
+    return means, ends
 
 
 def _slewed(command: Array, previous: Array, faster: Sequence[int], reach: float) -> tuple[Array, Array]:
@@ -248,7 +244,7 @@ def deliver(
         (k, substeps, m, ...); where no response has more than a rate (k, 1, m, ...), the commands themselves if they
         keep to it.
     """
-    acting = positions(responses, commands, sample_time_s=sample_time_s, standing=standing).means
+    acting, _ = positions(responses, commands, sample_time_s=sample_time_s, standing=standing)
     if all(response.follows for response in responses):
         return acting[:, None]
     count = substeps if isinstance(substeps, int) else len(substeps)
@@ -285,12 +281,12 @@ def delivered_at_samples(
 ) -> Array:
     """(k + 1, m) delivered values at the start of each sample, before its command acts, and at the end."""
     first = commands[0] if standing is None else standing
-    acting = positions(responses, commands, sample_time_s=sample_time_s, standing=standing)
-    result = np.concatenate([first[None], acting.ends])
+    means, ends = positions(responses, commands, sample_time_s=sample_time_s, standing=standing)
+    result = np.concatenate([first[None], ends])
     for column, response in enumerate(responses):
         if not response.follows:
             through = sample_map(response, sample_time_s=sample_time_s)
-            result[:, column] = _signals(through, acting.means[:, column], first[column])[0] + through.offset
+            result[:, column] = _signals(through, means[:, column], first[column])[0] + through.offset
     return result
 
 

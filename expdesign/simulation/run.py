@@ -84,7 +84,7 @@ def _at_ends(vessel: Vessel, commands: Commands, standing: Array | None) -> tupl
     """Delivered inputs (k, m) at the begin and at the end of every sample; held ones are the command at both."""
     values, step_s = commands.values, commands.sample_time_s
     exact = delivered_at_samples(vessel.responses, values, sample_time_s=step_s, standing=standing)
-    acting = positions(vessel.responses, values, sample_time_s=step_s, standing=standing).means
+    acting, _ = positions(vessel.responses, values, sample_time_s=step_s, standing=standing)
     held = np.array([response.follows for response in vessel.responses]) & (acting == values)
     return np.where(held, values, exact[:-1]), np.where(held, values, exact[1:])
 

@@ -71,7 +71,7 @@ def _slewed(ship: ExtendedModel, rows: Array, windows: Windows) -> Array:
             for batch in range(rows.shape[2]):
                 commands = rows[::held, [column], batch]
                 if not keeps_to(_stated_rate(ship, column, response.rate), commands[:, 0], sample_time_s=sample_s):
-                    given = positions((response,), commands, sample_time_s=sample_s, standing=None).means
+                    given, _ = positions((response,), commands, sample_time_s=sample_s, standing=None)
                     rows = rows.copy()
                     rows[:, column, batch] = np.repeat(given[:, 0], held)[: len(rows)]
     return rows

@@ -70,11 +70,11 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
         with _or_skipped(path, table, entry):
             _check_order([item for item in features if item.layer in used or kind_of(item, table)], box)
         deep, rule = _deep_water(file, depths, draught_m, entry)
-        found = closed_water(objects, rules, around(box), frame)
+        solid, closed, rules_notes = closed_water(objects, rules, around(box), frame)
         return ChartZones(
-            land=shapely.union(_land(chart, table, depths, box, frame), found.solid),
+            land=shapely.union(_land(chart, table, depths, box, frame), solid),
             deep=None if deep is None else _deep_union(table, chart, deep, depths, box, frame),
-            closed=found.closed,
+            closed=closed,
             depths=tuple(
                 (depths[name], _layer_union(chart, [name], box, frame))
                 for name in sorted(depths, key=depths.__getitem__)
@@ -88,7 +88,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
                         *_said_of_skipped(table),
                         *signs,
                         *chart.notes,
-                        *found.notes,
+                        *rules_notes,
                         *taken_for(features, table),
                         *not_used(unused, used),
                     )

@@ -230,15 +230,15 @@ def cell_zones(cell: Cell, rules: ShipRules, box: Box, frame: LocalFrame) -> Cha
     """The zones of a cell inside bounds."""
     window = around(box)
     areas = [feature for feature in cell.of(*DEPTHS) if feature.geometry.intersects(window)]
-    found = closed_water(cell.features, rules, window, frame)
+    solid, closed, notes = closed_water(cell.features, rules, window, frame)
     return ChartZones(
         depth_rule="",
-        land=found.solid,
+        land=solid,
         deep=united([area for area in areas if area.depth_m >= rules.needed_m], window, frame),
-        closed=found.closed,
+        closed=closed,
         depths=tuple(
             (depth, united([area for area in areas if area.depth_m == depth], window, frame))
             for depth in sorted({area.depth_m for area in areas if not np.isnan(area.depth_m)})
         ),
-        notes=found.notes,
+        notes=notes,
     )

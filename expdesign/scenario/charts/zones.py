@@ -245,23 +245,18 @@ class ShipRules:
     air_draught_m: float | None  # height above water [m], or None to close all bridges and cables
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedWater:
-    """What objects close, as geometries (east_m, north_m)."""
-
-    solid: shapely.Geometry  # land and obstacles at any depth
-    closed: shapely.Geometry  # dangers, buoys, what is overhead, and restricted areas
-    notes: tuple[str, ...]  # how many of which kind
-
-
 def closed_water(
     objects: Sequence[ChartedObject], rules: ShipRules, window: shapely.Geometry, frame: LocalFrame
-) -> ClosedWater:
+) -> tuple[shapely.Geometry, shapely.Geometry, tuple[str, ...]]:
     """The water that objects close to a ship, inside a window [deg].
 
     Args:
         objects: of any class; depth areas and other classes close nothing by themselves.
         window: (longitude, latitude) [deg].
+
+    Returns:
+        Land and obstacles at any depth; dangers, buoys, what is overhead and restricted areas, both (east_m, north_m);
+        and how many there are of which kind.
     """
     objects = [item for item in objects if item.geometry.intersects(window)]
     restricted = [item for item in objects if item.why]
@@ -281,14 +276,12 @@ def closed_water(
     }
     solid = [item for item in charted if item.kind in SOLID]
     whys = Counter(item.why for item in restricted)
-    return ClosedWater(
-        solid=united(solid, window, frame, margin_m=rules.margin_m),
-        closed=shapely.union_all([united(items, window, frame, margin_m=margin) for items, margin in closed.values()]),
-        notes=(
-            *(f"kept clear of {len(items)} {what}" for what, (items, _) in closed.items() if items),
-            *(f"{count} areas closed by rule: {why}" for why, count in whys.items()),
-        ),
+    notes = (
+        *(f"kept clear of {len(items)} {what}" for what, (items, _) in closed.items() if items),
+        *(f"{count} areas closed by rule: {why}" for why, count in whys.items()),
     )
+    parts = [united(items, window, frame, margin_m=margin) for items, margin in closed.values()]
+    return united(solid, window, frame, margin_m=rules.margin_m), shapely.union_all(parts), notes
 
 
 def united(

@@ -55,8 +55,7 @@ def whatif(request: requests.WhatIf, *, progress: Progress = silent) -> Outcome:
     """
     progress("reading the scenario", 0.0)
     base = load_scenario(request.scenario)
-    read = [load_variant(request.scenario, variant) for variant in request.variants]
-    cases = [(base, ()), *((item.scenario, item.changes) for item in read)]
+    cases = [(base, ()), *(load_variant(request.scenario, variant) for variant in request.variants)]
     names = [case.name for case, _ in cases]
     for name in names:
         if names.count(name) > 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.durations import (
     Aim,
-    Budget,
     Constraints,
     DurationDesign,
     DurationProblem,
@@ -37,7 +37,6 @@ from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import Scenario
-from expdesign.scenario.values import BudgetSettings
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel
@@ -174,24 +173,21 @@ def aim_of(
     gradients = np.zeros((0, 0))
     if settings.outcomes:
         progress("simulating standard trials with other parameters", 0.0)
-        found = outcome_gradients(
+        values, slopes = outcome_gradients(
             case.vessel,
             settings.outcomes,
             own,
             speed_mps=settings.outcome_speed_mps,
             progress=progress,
         )
+        names = tuple(settings.outcomes)
         units = np.array(
-            [
-                settings.outcome_units.get(name, abs(value))
-                for name, value in zip(found.names, found.values, strict=True)
-            ]
+            [settings.outcome_units.get(name, abs(value)) for name, value in zip(names, values, strict=True)]
         )
         if not (units > 0).all():
-            raise InputError(f"design.outcome_units needs a unit for {found.names[int(np.argmin(units))]}, which is 0")
-        names = found.names
+            raise InputError(f"design.outcome_units needs a unit for {names[int(np.argmin(units))]}, which is 0")
         gradients = np.zeros((len(names), len(parameters)))
-        gradients[:, [parameters.index(name) for name in own]] = found.gradients / units[:, None]
+        gradients[:, [parameters.index(name) for name in own]] = slopes / units[:, None]
     own_samples = settings.criterion == "D" and settings.excitation != "free"  # shares of samples are no parameters
     return Aim(
         criterion="D_s" if own_samples else settings.criterion,
@@ -211,14 +207,14 @@ def constraints_of(case: Scenario, primitives: Sequence[Primitive]) -> Constrain
         most_s=settings.most_s,
         required=settings.required,
         excluded=settings.excluded,
-        budgets=tuple(_budget(item, primitives) for item in settings.budgets),
+        budgets=tuple(
+            item
+            if item.cost_per_s
+            else replace(item, cost_per_s={run.name: cubed_propeller_speed(run) for run in primitives})
+            for item in settings.budgets
+        ),
         balance=settings.balance,
     )
-
-
-def _budget(settings: BudgetSettings, primitives: Sequence[Primitive]) -> Budget:
-    cost = settings.cost_per_s or {item.name: cubed_propeller_speed(item) for item in primitives}
-    return Budget(name=settings.name, cost_per_s=cost, limit=settings.limit)
 
 
 def cubed_propeller_speed(primitive: Primitive) -> float:

@@ -78,11 +78,11 @@ def _of_dictionary(path: Path, vessel: Vessel | None) -> list[tuple[Array, Array
 
 
 def _of_table(path: Path, names: Sequence[str]) -> Listing:
-    read = read_levels(path, inputs=names)
-    if read.time_s is None:
-        return read.values, read.numbers, math.inf
-    interval_s = float(np.median(np.diff(read.time_s))) if len(read.values) > 1 else USUAL_INTERVAL_S
-    levels, lengths_s = levels_of(read.values, interval_s)
+    values, time_s, numbers = read_levels(path, inputs=names)
+    if time_s is None:
+        return values, numbers, math.inf
+    interval_s = float(np.median(np.diff(time_s))) if len(values) > 1 else USUAL_INTERVAL_S
+    levels, lengths_s = levels_of(values, interval_s)
     return levels, None, float(lengths_s[0]) if len(levels) else math.inf
 
 
