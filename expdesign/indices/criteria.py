@@ -13,6 +13,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 # largest deviation of helm and reversals of a 10/10 or 20/20 zig-zag from the nominal angles [rad]
 ZIGZAG_DEVIATION_RAD = math.radians(2.0)
@@ -211,14 +212,13 @@ class Conditions:
     required_room_m: float  # the required least distance
 
 
-@dataclass(frozen=True, kw_only=True)
-class Condition:
-    """One condition of a trial."""
+class Condition(NamedTuple):
+    """A condition of a trial, or of a plan."""
 
-    what: str  # the condition
-    found: str  # its expected value, in words
-    required: str  # the requirement of the source
-    met: bool | None  # True, False, or None where it cannot be known in advance
+    what: str
+    found: str  # its value, in words
+    required: str = ""
+    met: bool | None = None  # None where nothing is required, or it cannot be known in advance
 
 
 def beaufort(wind_mps: float) -> int:
@@ -236,10 +236,10 @@ def _depth(known: Conditions) -> Condition:
     depth = known.least_depth_m
     found = "not charted" if depth is None else f"at least {depth:g} m ({depth / known.draught_m:.1f} draughts)"
     return Condition(
-        what="Water depth under the track",
-        found=found,
-        required=f"more than {needed:g} m (4 mean draughts)",
-        met=None if depth is None else depth > needed,
+        "Water depth under the track",
+        found,
+        f"more than {needed:g} m (4 mean draughts)",
+        None if depth is None else depth > needed,
     )
 
 
@@ -247,36 +247,36 @@ def _wind(known: Conditions) -> Condition:
     mean, windy = beaufort(known.wind_mps), beaufort(known.wind_mps + 2 * known.wind_std_mps)
     spread = f", up to {windy} with two standard deviations" if windy > mean else ""
     return Condition(
-        what="Wind",
-        found=f"{known.wind_mps:.1f} m/s, Beaufort {mean}{spread}",
-        required=f"Beaufort {STRONGEST_WIND} at most",
-        met=windy <= STRONGEST_WIND or (None if mean <= STRONGEST_WIND else False),
+        "Wind",
+        f"{known.wind_mps:.1f} m/s, Beaufort {mean}{spread}",
+        f"Beaufort {STRONGEST_WIND} at most",
+        windy <= STRONGEST_WIND or (None if mean <= STRONGEST_WIND else False),
     )
 
 
 def _sea(known: Conditions) -> Condition:
     state = known.sea_state
     return Condition(
-        what="Sea state",
-        found="not given" if state is None else f"{state}",
-        required=f"{HIGHEST_SEA} at most",
-        met=None if state is None else state <= HIGHEST_SEA,
+        "Sea state",
+        "not given" if state is None else f"{state}",
+        f"{HIGHEST_SEA} at most",
+        None if state is None else state <= HIGHEST_SEA,
     )
 
 
 def _current(known: Conditions) -> Condition:
     return Condition(
-        what="Current",
-        found=f"{known.current_mps:.2f} m/s, assumed uniform; standard deviation {known.current_std_mps:.2f} m/s",
-        required="uniform, so that it can be corrected for",
-        met=None,
+        "Current",
+        f"{known.current_mps:.2f} m/s, assumed uniform; standard deviation {known.current_std_mps:.2f} m/s",
+        "uniform, so that it can be corrected for",
+        None,
     )
 
 
 def _room(known: Conditions) -> Condition:
     return Condition(
-        what="Sea room",
-        found=f"{known.room_m:.0f} m from the hull to forbidden water",
-        required=f"at least {known.required_room_m:g} m",
-        met=known.room_m >= known.required_room_m,
+        "Sea room",
+        f"{known.room_m:.0f} m from the hull to forbidden water",
+        f"at least {known.required_room_m:g} m",
+        known.room_m >= known.required_room_m,
     )

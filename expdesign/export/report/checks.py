@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -106,38 +105,24 @@ def day_sentence(plan: Plan) -> str:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Check:
-    """One line of the verification; `passed` is None where a number is only reported."""
-
-    what: str
-    found: str
-    required: str
-    passed: bool | None
-
-
-def checks(content: ReportContent) -> list[Check]:
-    """Results of the independent check beside the requirements."""
+def checks(content: ReportContent) -> list[Condition]:
+    """Results of the independent check beside the requirements; some are only reported."""
     plan, found = content.plan, content.plan.verification
     rows = [
-        Check(
-            what="Least distance from the hull to forbidden water",
-            found=f"{words.distance(found.clearance_min_m)} at {words.clock(found.clearance_time_s)}",
-            required=f"at least {words.distance(content.clearance_m)}",
-            passed=found.clearance_min_m >= content.clearance_m,
+        Condition(
+            "Least distance from the hull to forbidden water",
+            f"{words.distance(found.clearance_min_m)} at {words.clock(found.clearance_time_s)}",
+            f"at least {words.distance(content.clearance_m)}",
+            found.clearance_min_m >= content.clearance_m,
         ),
-        Check(
-            what="Largest distance between the planned track and the independent simulation"
+        Condition(
+            "Largest distance between the planned track and the independent simulation"
             + (f", begun anew every {words.duration(found.stretch_s)}" if found.stretch_s else ""),
-            found="less than 1 mm" if found.reproduction_error_m < 1e-3 else words.distance(found.reproduction_error_m),
-            required="",
-            passed=None,
+            "less than 1 mm" if found.reproduction_error_m < 1e-3 else words.distance(found.reproduction_error_m),
         ),
-        Check(
-            what="Largest violation of an actuator limit or rate limit",
-            found="none" if found.limit_excess < 1e-6 else f"{words.percent(found.limit_excess)} of its range",
-            required="",
-            passed=None,
+        Condition(
+            "Largest violation of an actuator limit or rate limit",
+            "none" if found.limit_excess < 1e-6 else f"{words.percent(found.limit_excess)} of its range",
         ),
     ]
     if found.heel_max_rad is not None:
@@ -147,54 +132,50 @@ def checks(content: ReportContent) -> list[Check]:
     return [*rows, *_risk_checks(plan.risk, 1.0 - content.confidence), *_conditioned_prior(content.vessel.model)]
 
 
-def _heel_check(content: ReportContent, heel_rad: float) -> Check:
+def _heel_check(content: ReportContent, heel_rad: float) -> Condition:
     """The roll of [roll], which does not act back on the path."""
     pendulum = content.vessel.pendulum
     limit = float("inf") if pendulum is None else pendulum.heel_max_rad
     stated = np.isfinite(limit)
-    return Check(
-        what="Largest roll angle of the independent simulation, in still water",
-        found=f"{words.number(float(np.degrees(heel_rad)), 1)}\N{DEGREE SIGN}",
-        required=f"at most {words.number(float(np.degrees(limit)), 1)}\N{DEGREE SIGN}" if stated else "",
-        passed=bool(heel_rad <= limit + 1e-9) if stated else None,
+    return Condition(
+        "Largest roll angle of the independent simulation, in still water",
+        f"{words.number(float(np.degrees(heel_rad)), 1)}\N{DEGREE SIGN}",
+        f"at most {words.number(float(np.degrees(limit)), 1)}\N{DEGREE SIGN}" if stated else "",
+        bool(heel_rad <= limit + 1e-9) if stated else None,
     )
 
 
-def _conditioned_prior(model: VesselModel) -> list[Check]:
+def _conditioned_prior(model: VesselModel) -> list[Condition]:
     """Which vessels the Monte Carlo trials were drawn from, where the file states what is known to hold."""
     if not model.parameter_range:
         return []
     share = words.percent(model.share_in_range())
     return [
-        Check(
-            what="Simulated vessels, drawn from the standard deviations in the vessel file",
-            found=f"{share} of the drawn ones keep to its parameter_min and parameter_max; the others were drawn again",
-            required="",
-            passed=None,
+        Condition(
+            "Simulated vessels, drawn from the standard deviations in the vessel file",
+            f"{share} of the drawn ones keep to its parameter_min and parameter_max; the others were drawn again",
         )
     ]
 
 
-def _risk_checks(risk: RiskEstimate, allowed: float) -> list[Check]:
+def _risk_checks(risk: RiskEstimate, allowed: float) -> list[Condition]:
     """Results of the Monte Carlo trials."""
     return [
-        Check(
-            what="Probability that the hull leaves allowed water during the trial",
-            found=left_words(risk),
-            required=f"at most {words.percent(allowed)}",
-            passed=risk.left <= allowed + 1e-12,
+        Condition(
+            "Probability that the hull leaves allowed water during the trial",
+            left_words(risk),
+            f"at most {words.percent(allowed)}",
+            risk.left <= allowed + 1e-12,
         ),
-        Check(
-            what="Trials aborted because a run could not start within its tolerances",
-            found=aborted_words(risk),
-            required=f"at most {words.percent(risk.aborted_most)}",
-            passed=not risk.note,
+        Condition(
+            "Trials aborted because a run could not start within its tolerances",
+            aborted_words(risk),
+            f"at most {words.percent(risk.aborted_most)}",
+            not risk.note,
         ),
-        Check(
-            what="Time in addition to the plan, for returning to the start of each run",
-            found=extra_words(risk),
-            required="",
-            passed=None,
+        Condition(
+            "Time in addition to the plan, for returning to the start of each run",
+            extra_words(risk),
         ),
     ]
 

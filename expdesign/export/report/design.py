@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from expdesign.durations import CRITERIA, DurationDesign, limits_kept
+from expdesign.durations import CRITERIA, DurationDesign, Efficiencies, limits_kept
 from expdesign.estimation.methods import steady_current_method
 from expdesign.export import words
 from expdesign.export.files import Known, PlannedAccuracy, Purchase
@@ -187,29 +186,15 @@ def _gain(known: Known) -> str:
 # The criterion of the design, its certificate, and the efficiency under other criteria.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """Efficiencies as a table; `missing` gives the reason why a criterion is not in it."""
-
-    designs: tuple[str, ...]
-    rows: tuple[tuple[str, str, tuple[str, ...]], ...]
-    missing: tuple[tuple[str, str], ...]
-
-
 NAMES = {"continuous": "optimal allocation", "repeats": "whole runs", "uniform": "equal time"}
 
 
-def comparison(content: ReportContent) -> Comparison:
-    """Every design under every criterion."""
-    known = [item for item in content.compared if item.of]
+def comparison(compared: Sequence[Efficiencies]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: every design under every criterion that is known."""
+    known = [item for item in compared if item.of]
     designs = tuple(known[0].of) if known else ()
-    return Comparison(
-        designs=tuple(NAMES.get(name, name) for name in designs),
-        rows=tuple(
-            (item.criterion, item.title, tuple(words.percent(item.of[name]) for name in designs)) for item in known
-        ),
-        missing=tuple((item.criterion, item.missing) for item in content.compared if item.missing),
-    )
+    header = ("Efficiency by criterion", "It minimises the", *(NAMES.get(name, name) for name in designs))
+    return header, [(item.criterion, item.title, *(words.percent(item.of[name]) for name in designs)) for item in known]
 
 
 def limit_rows(content: ReportContent) -> list[tuple[str, str, str, str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -187,15 +186,6 @@ def parameter_size(content: ReportContent) -> Array:
 # The whole plan over time: speed, yaw rate, commands, with the informative runs shaded.
 
 
-@dataclass(frozen=True)
-class _Panel:
-    """Signals that share an axis."""
-
-    title: str
-    names: tuple[str, ...]
-    values: Array
-
-
 GROUPS = {
     "n": ("propeller speed [rev/s]", 1.0),
     "a": ("azimuth angle [\N{DEGREE SIGN}]", float(np.degrees(1.0))),
@@ -227,16 +217,20 @@ def timeline_figure(plan: Plan) -> str:
     return svg(figure, key="timeline", label="Speed, yaw rate and actuator commands over time, informative runs shaded")
 
 
-def _motion_panels(plan: Plan) -> tuple[_Panel, ...]:
+Panel = tuple[str, tuple[str, ...], Array]
+"""Title, names and values (k, n) of signals that share an axis."""
+
+
+def _motion_panels(plan: Plan) -> tuple[Panel, ...]:
     u, v, r = plan.trajectory.velocity.T
     speeds = np.stack([u, v], axis=1)
     return (
-        _Panel("velocity over\nground [m/s]", ("u ahead", "v to starboard"), speeds),
-        _Panel("yaw rate [\N{DEGREE SIGN}/s]", ("r",), np.degrees(r)[:, None]),
+        ("velocity over\nground [m/s]", ("u ahead", "v to starboard"), speeds),
+        ("yaw rate [\N{DEGREE SIGN}/s]", ("r",), np.degrees(r)[:, None]),
     )
 
 
-def _command_panels(plan: Plan) -> tuple[_Panel, ...]:
+def _command_panels(plan: Plan) -> tuple[Panel, ...]:
     grouped: dict[str, list[tuple[str, Array]]] = {}
     for name in plan.commands.names:
         title, factor = GROUPS.get(stem(name), (plain(name), 1.0))
@@ -246,7 +240,7 @@ def _command_panels(plan: Plan) -> tuple[_Panel, ...]:
         for title, signals in grouped.items()
     }
     return tuple(
-        _Panel(title, tuple(name for name, _ in signals), np.stack([values for _, values in signals], axis=1))
+        (title, tuple(name for name, _ in signals), np.stack([values for _, values in signals], axis=1))
         for title, signals in grouped.items()
     )
 
@@ -258,12 +252,13 @@ def _within_a_turn(degrees: Array) -> Array:
     return wrapped
 
 
-def _draw(axes: Axes, panel: _Panel, sample_time_s: float) -> None:
-    time_min = np.arange(len(panel.values)) * sample_time_s / 60
-    for name, values, colour in zip(panel.names, panel.values.T, LINES * len(panel.names), strict=False):
-        axes.plot(time_min, values, color=colour, linewidth=1.1, label=short(name))  # thinned where straight
-    axes.set_ylabel(panel.title, fontsize=9)
-    if len(panel.names) > 1:
+def _draw(axes: Axes, panel: Panel, sample_time_s: float) -> None:
+    title, names, values = panel
+    time_min = np.arange(len(values)) * sample_time_s / 60
+    for name, column, colour in zip(names, values.T, LINES * len(names), strict=False):
+        axes.plot(time_min, column, color=colour, linewidth=1.1, label=short(name))  # thinned where straight
+    axes.set_ylabel(title, fontsize=9)
+    if len(names) > 1:
         axes.legend(loc="center left", bbox_to_anchor=(1.09, 0.5), fontsize=8)
     light_grid(axes)
 

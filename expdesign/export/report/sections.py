@@ -208,16 +208,12 @@ def _durations(content: ReportContent) -> Iterator[Block]:
         "information."
     )
     yield f"{whole} {equal_time_sentence(design)} {criterion_sentence(content)}"
-    compared = comparison(content)
-    if len(compared.rows) > 1:
-        header = ("Efficiency by criterion", "It minimises the", *compared.designs)
-        yield _page_table(header, [(name, title, *cells) for name, title, cells in compared.rows], texts=2)
-    if compared.missing:
-        names = ", ".join(name for name, _ in compared.missing)
-        yield Items(
-            tuple(why for _, why in compared.missing),
-            folded=f"Criteria that are not computed for this scenario: {names}",
-        )
+    header, rows = comparison(content.compared)
+    if len(rows) > 1:
+        yield _page_table(header, rows, texts=2)
+    if missing := {item.criterion: item.missing for item in content.compared if item.missing}:
+        names = ", ".join(missing)
+        yield Items(tuple(missing.values()), folded=f"Criteria that are not computed for this scenario: {names}")
     if limits := limit_rows(content):
         yield _page_table(("Limit", "Required", "Optimal allocation", "Whole runs", "Price"), limits)
 
@@ -366,7 +362,7 @@ def _verification(content: ReportContent) -> Iterator[Block]:
     passed = {True: verdict("\N{CHECK MARK} passed", True), False: verdict("\N{BALLOT X} failed", False), None: ""}
     all_passed = verdict("\N{CHECK MARK} verified" if plan.verified else "\N{BALLOT X} not verified", plan.verified)
     problems = "; ".join(plan.verification.problems) or ("no problems found" if plan.verified else plan.verdict)
-    rows = [(row.what, row.found, row.required, passed[row.passed]) for row in checks(content)]
+    rows = [(row.what, row.found, row.required, passed[row.met]) for row in checks(content)]
     yield (
         "An independent check simulates the commands again from the start with a ten times smaller step, and sweeps "
         "the hull against the polygons of the chart. It shares the equations of motion and the chart with the planner, "
