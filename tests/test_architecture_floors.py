@@ -33,7 +33,6 @@ FLOORS = {
     ),
     "records": (("file",), ("pose",), ("load", "levels", "pieces")),
     "step_trials": (
-        ("tuning",),
         ("holds", "regression", "responses"),
         ("steady_state", "noise"),
         ("samples",),

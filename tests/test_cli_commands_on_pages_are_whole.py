@@ -21,7 +21,7 @@ from expdesign.estimation.replay import STEERED
 from expdesign.estimation.replay.replay import INTEGRATORS
 from expdesign.estimation.solve import BLOCKS
 from expdesign.information import MEAN_SUBTRACTIONS
-from expdesign.monitoring.tuning import TUNING
+from expdesign.monitoring.changes import RELATIVE_SIZE
 from expdesign.records import VELOCITY_METHODS
 from expdesign.records.load import LABEL_SOURCES
 from expdesign.requests import (
@@ -84,7 +84,7 @@ def test_usual_values_are_those_of_what_a_command_calls() -> None:
     both = {item.name: item.default for item in fields(EstimateOptions) if item.name in asked}
     assert len(both) == 12
     assert both == {name: asked[name] for name in both}
-    assert Monitor.size == TUNING.relative_size
+    assert Monitor.size == RELATIVE_SIZE
 
 
 def test_choices_are_those_of_what_a_command_calls_and_their_help_names_each() -> None:

@@ -14,7 +14,7 @@ from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import CrossValidation
 from expdesign.diagnosis.fit.cross_validation import error_of_constants
 from expdesign.diagnosis.fit.held_out import HeldOut, certain_reductions, held_out_gain
-from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.diagnosis.fit.output_error import AHEAD_S
 from expdesign.diagnosis.judgement import losses_without
 from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.diagnosis.select import backward_elimination
@@ -41,7 +41,7 @@ def test_a_model_that_runs_away_loses_stretches_and_no_more():
     turned = np.where([term.equation == "r" for term in ship.model.terms], -4.0, 1.0) * ship.model.parameters
     wild = replace(ship, model=replace(ship.model, parameters=turned))
     good, bad = (CrossValidation(windows, record).without(None, one) for one in (ship, wild))
-    short = cut_windows(ship.model, record, longest_s=TUNING.ahead_s)
+    short = cut_windows(ship.model, record, longest_s=AHEAD_S)
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
     measured = short.measured[..., columns]
     most = error_of_constants(measured, short.batch)

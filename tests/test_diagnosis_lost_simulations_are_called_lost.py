@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
-from expdesign.diagnosis.accuracy import TUNING, accuracy, clipped
+from expdesign.diagnosis.accuracy import LARGEST_ERROR, accuracy, clipped
 from expdesign.diagnosis.conclusions import note_on_divergence
 from expdesign.diagnosis.data import cut_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -20,7 +20,7 @@ def test_a_model_that_runs_away_has_a_bounded_error():
     wild = replace(ship, model=ship.model.with_parameters({"X_u": 2.0, "N_r": 2.0}))
     found = accuracy(extended_model(wild, record), record)
     velocity = np.concatenate([batch.velocity for batch in record.batches])
-    assert (found.rmse <= (1 + 1e-6) * TUNING.largest_error * velocity.std(axis=0) + 1e-9).all()
+    assert (found.rmse <= (1 + 1e-6) * LARGEST_ERROR * velocity.std(axis=0) + 1e-9).all()
     assert (np.abs(found.bias) <= found.rmse).all()
     assert (found.fit[[0, 2]] < -500).all()
     assert np.isfinite(found.growth).all()

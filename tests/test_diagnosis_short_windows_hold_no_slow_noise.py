@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.fit import fit, with_longer_windows
-from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.diagnosis.fit.output_error import AHEAD_S
 from expdesign.diagnosis.motion import initial_states, longest_windows, stable_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model
 
@@ -30,7 +30,7 @@ def test_a_current_is_certain_where_slow_noise_would_take_its_place(seed):
     begun, windows = with_longer_windows(ship, record, stable_windows(ship, record))
     assert begun is ship
     assert windows.white_noise
-    assert windows.steps * windows.step_s < TUNING.ahead_s
+    assert windows.steps * windows.step_s < AHEAD_S
     found, slow = (current_in(ship, part) for part in (windows, replace(windows, white_noise=False)))
     assert slow[1] < chi2.isf(0.005, 2) < found[1]
     assert found[0] < slow[0]

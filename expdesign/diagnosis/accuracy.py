@@ -19,31 +19,23 @@ from expdesign.values import Array
 
 # Numbers that steer measures of accuracy.
 
-
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
-    """Numbers of this module."""
-
-    # times after a start at which the growth of the error is measured [s]
-    horizons_s: tuple[float, ...] = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
-    # errors beyond so many standard deviations of the measurements count as that large; the simulation has diverged,
-    # and the size of its error has no meaning
-    largest_error: float = 10.0
-    stretch_samples: int = 10  # of a stretch of the residual analysis
-    fewest_measured: int = 5  # samples of a stretch that must be measured
-    groups: int = 8  # of stretches with similar values of a variable
-    fewest_stretches: int = 16  # for a test
-    # largest_autocorrelation, smallest_autocorrelation: of successive residuals, beyond which they are bounded and
-    # ignored
-    largest_autocorrelation: float = 0.9
-    smallest_autocorrelation: float = 0.01
-    fewest_samples: int = 100  # for a diagnosis
-    constant_range: float = 1e-9  # range of a constant input, as a share of its size
-    # response of the motion to the inputs' changes, in standard deviations of the noise, at least
-    least_response: float = 0.5
-
-
-TUNING = Tuning()
+# times after a start at which the growth of the error is measured [s]
+HORIZONS_S = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
+# errors beyond so many standard deviations of the measurements count as that large; the simulation has diverged,
+# and the size of its error has no meaning
+LARGEST_ERROR = 10.0
+STRETCH_SAMPLES = 10  # of a stretch of the residual analysis
+FEWEST_MEASURED = 5  # samples of a stretch that must be measured
+GROUPS = 8  # of stretches with similar values of a variable
+FEWEST_STRETCHES = 16  # for a test
+# largest_autocorrelation, smallest_autocorrelation: of successive residuals, beyond which they are bounded and
+# ignored
+LARGEST_AUTOCORRELATION = 0.9
+SMALLEST_AUTOCORRELATION = 0.01
+FEWEST_SAMPLES = 100  # for a diagnosis
+CONSTANT_RANGE = 1e-9  # range of a constant input, as a share of its size
+# response of the motion to the inputs' changes, in standard deviations of the noise, at least
+LEAST_RESPONSE = 0.5
 
 
 # Whether data are sufficient for a diagnosis.
@@ -59,11 +51,11 @@ def check_excitation(ship: ExtendedModel, windows: Windows) -> None:
         NotInformative: naming what is missing.
     """
     samples = int(np.isfinite(windows.measured[..., :3]).any(axis=2).sum())
-    if samples < TUNING.fewest_samples:
+    if samples < FEWEST_SAMPLES:
         seconds = samples * windows.sample_s
         raise NotInformative(
             f"the data are too short for a diagnosis: {samples} samples of {windows.sample_s:g} s ({seconds:.0f} s), "
-            f"expected {TUNING.fewest_samples} or more"
+            f"expected {FEWEST_SAMPLES} or more"
         )
     for name in ship.model.outputs:
         if not np.isfinite(windows.measured[..., OUTPUTS.index(name)]).any():
@@ -83,7 +75,7 @@ def check_excitation(ship: ExtendedModel, windows: Windows) -> None:
 def constant_inputs(ship: ExtendedModel, windows: Windows) -> tuple[str, ...]:
     """Inputs that never change."""
     rows = np.concatenate(windows.batch_inputs)
-    size = TUNING.constant_range * (1.0 + np.abs(rows).max(axis=0))
+    size = CONSTANT_RANGE * (1.0 + np.abs(rows).max(axis=0))
     return tuple(name for name, span, least in zip(ship.model.inputs, np.ptp(rows, axis=0), size, strict=True)
                  if span <= least)  # fmt: skip
 
@@ -99,7 +91,7 @@ def _check_answer(ship: ExtendedModel, windows: Windows) -> None:
     answer = np.where(np.isfinite(measured), (moved - steady)[..., columns], 0.0)
     size = np.sqrt((answer**2).sum(axis=(0, 1)) / np.maximum(np.isfinite(measured).sum(axis=(0, 1)), 1))
     noise = white_noise_std(measured)
-    if (size < TUNING.least_response * noise).all():
+    if (size < LEAST_RESPONSE * noise).all():
         rows = np.concatenate(windows.batch_inputs)
         spans = ", ".join(
             f"{name} by {span:.2g}" for name, span in zip(ship.model.inputs, np.ptp(rows, axis=0).tolist(), strict=True)
@@ -162,16 +154,16 @@ def squared_sums(error: Array, measured: Array) -> tuple[Array, Array]:
 
 
 def clipped(error: Array, measured: Array) -> Array:
-    """Errors (w, s, n) no larger than `Tuning.largest_error` standard deviations of the measurements."""
+    """Errors (w, s, n) no larger than `LARGEST_ERROR` standard deviations of the measurements."""
     size = channel_std(measured)
-    most = np.where(size > 0, TUNING.largest_error * size, np.inf)
+    most = np.where(size > 0, LARGEST_ERROR * size, np.inf)
     return np.asarray(np.clip(error, -most, most))
 
 
 def _growth(ship: ExtendedModel, record: Record, columns: list[int]) -> tuple[Array, Array]:
     shortest = min(len(batch) * batch.sample_time_s for batch in record.batches)
     horizons, rows = [], []
-    for horizon in TUNING.horizons_s:
+    for horizon in HORIZONS_S:
         if horizon < 4 * record.batches[0].sample_time_s or horizon > shortest:
             continue
         windows = cut_windows(ship.model, record, longest_s=horizon)
@@ -220,14 +212,14 @@ class Dependence:
 
 def one_step_residuals(ship: ExtendedModel, windows: Windows) -> Residuals:
     """Residuals of a model over all data."""
-    short = windows.cut_shorter(TUNING.stretch_samples)
+    short = windows.cut_shorter(STRETCH_SAMPLES)
     measured = short.measured[..., :3]
     error = clipped(simulate_from_measured(ship, short).error[..., :3], measured)
     slopes, seen = _slopes(error, short.sample_s)
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
     variables = _variables(ship, short)
     order = np.argsort(variables["time"], kind="stable")
-    kept = order[(seen[order][:, columns] >= TUNING.fewest_measured).all(axis=1)]
+    kept = order[(seen[order][:, columns] >= FEWEST_MEASURED).all(axis=1)]
     return Residuals(
         outputs=ship.model.outputs,
         stretch_s=short.steps * short.step_s,
@@ -313,11 +305,11 @@ def _covariance(rest: Array, share: Array, run: Array) -> tuple[Array, float]:
     together = run[1:] == run[:-1]
     alike = float((rest[1:] * rest[:-1])[together].sum()) / max(float(rest @ rest), TINY)
     alike = min(
-        max(alike + b * (1 + 3 * alike) / k, 0.0), TUNING.largest_autocorrelation
+        max(alike + b * (1 + 3 * alike) / k, 0.0), LARGEST_AUTOCORRELATION
     )  # subtracting group means reduces the correlation
     covariance = share.T @ share
     for lag in range(1, k):
-        if alike**lag < TUNING.smallest_autocorrelation:
+        if alike**lag < SMALLEST_AUTOCORRELATION:
             break
         both = (share[lag:] * (run[lag:] == run[:-lag])[:, None]).T @ share[:-lag]
         covariance += alike**lag * (both + both.T)
@@ -328,7 +320,7 @@ def _group_numbers(x: Array, *, by_value: bool) -> Array:
     """(k,) number of the group of every stretch, without empty groups."""
     if by_value:
         return np.asarray(np.unique(x, return_inverse=True)[1])
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, TUNING.groups + 1)[1:-1]))
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, GROUPS + 1)[1:-1]))
     return np.asarray(np.unique(np.searchsorted(edges, x, side="left"), return_inverse=True)[1])
 
 
@@ -346,4 +338,4 @@ class Residuals:
     @property
     def sufficient(self) -> bool:
         """Whether there are enough stretches for a test."""
-        return len(self.acceleration) >= TUNING.fewest_stretches
+        return len(self.acceleration) >= FEWEST_STRETCHES

@@ -17,7 +17,6 @@ from expdesign.roll import (
     EFFECTS,
     MEANINGS,
     PARAMETERS,
-    TUNING,
     UNITS,
     LowPass,
     NullSpace,
@@ -27,6 +26,8 @@ from expdesign.roll import (
     roll_frequency,
     stiffness,
 )
+from expdesign.roll.estimate import LEAST_STRENGTH
+from expdesign.roll.regression import MOST_SURPRISE
 
 PARAMETER_HEADER = ("Parameter", "Meaning", "Estimate", "95 % interval", "Unit")
 SCALED_HEADER = ("Parameter", "At full scale", "95 % interval", "Unit")
@@ -120,7 +121,7 @@ def roll_sentences(content: RollContent) -> Iterator[str]:
     yield _filtered(content)
     if not estimate.settled:
         yield "Instruments and noise models did not settle; expected longer runs, or a better start under [start]."
-    if estimate.surprise > TUNING.most_surprise:
+    if estimate.surprise > MOST_SURPRISE:
         yield (
             f"Residuals follow the rudder {estimate.surprise:.2g} times as much as noise would: the model misses "
             "something, or a strong roll moment of waves hides what the rudder does."
@@ -129,7 +130,7 @@ def roll_sentences(content: RollContent) -> Iterator[str]:
         yield (
             "Waves and sensors hide what the rudder does, so that estimates lean towards those of least squares: the "
             f"information from the rudder is {estimate.strength:.2g} times what noise alone would give, expected "
-            f"{TUNING.least_strength:g} times or more by larger rudder angles, longer runs or calmer water."
+            f"{LEAST_STRENGTH:g} times or more by larger rudder angles, longer runs or calmer water."
         )
     if estimate.answering:
         yield (
@@ -178,7 +179,7 @@ def headline(content: RollContent) -> str:
     reasons = {
         "least squares is biased by waves and sensors": one.method == "ls",
         f"the search for {' and '.join(one.reached)} ended at a bound": bool(one.reached),
-        "the model misses something of what the rudder does": one.surprise > TUNING.most_surprise,
+        "the model misses something of what the rudder does": one.surprise > MOST_SURPRISE,
         "waves and sensors hide what the rudder does": one.weak,
         "the rudder seems to answer roll": one.answering,
         "the estimate did not settle": not one.settled,

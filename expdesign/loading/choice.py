@@ -31,7 +31,6 @@ from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.progress import Progress, silent
 from expdesign.roll import (
     PARAMETERS,
-    TUNING,
     Direction,
     coefficients,
     cures,
@@ -41,6 +40,7 @@ from expdesign.roll import (
     parameters,
     sensed_inertia,
 )
+from expdesign.roll.runs import LEAST_SAMPLES_PER_PERIOD
 from expdesign.signals import AUXILIARY, Trajectory
 from expdesign.simulation import rudder_angle, simulate
 from expdesign.values import Array, seal
@@ -98,10 +98,10 @@ def _check(vessel: Vessel, pendulum: RollPendulum, option: LoadOption) -> None:
             f"with {option.name} the ship does not stay upright: her metacentric height is "
             f"{pendulum.metacentric_height_m:.3g} m; leave this load out"
         )
-    if pendulum.period_s / vessel.sample_time_s < TUNING.least_samples_per_period:
+    if pendulum.period_s / vessel.sample_time_s < LEAST_SAMPLES_PER_PERIOD:
         raise NotInformative(
             f"roll has a period of {pendulum.period_s:.3g} s with {option.name} and vessel.sample_time_s is "
-            f"{vessel.sample_time_s:g}, expected {TUNING.least_samples_per_period:g} samples or more in a period"
+            f"{vessel.sample_time_s:g}, expected {LEAST_SAMPLES_PER_PERIOD:g} samples or more in a period"
         )
 
 

@@ -29,4 +29,3 @@ from expdesign.monitoring.saved import (
     saved,
 )
 from expdesign.monitoring.state import Alarm, Call, Rules, State, Step
-from expdesign.monitoring.tuning import TUNING

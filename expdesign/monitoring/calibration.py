@@ -12,8 +12,9 @@ from scipy.optimize import minimize
 from expdesign.errors import NotInformative
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
-from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array, seal
+
+KNOWN_WITHIN = 6.0  # a change is watched for where its size is so many standard errors of the reference
 
 ITERATIONS = 60  # of the expectation-maximisation of noise and force
 FEWEST_STRETCHES = 40  # of a reference
@@ -114,7 +115,7 @@ class Calibration:
     @property
     def watched(self) -> NDArray[np.bool_]:
         """(m,) changes that can be told from the uncertainty of the reference itself."""
-        return np.asarray(self.rate * self.stretches >= TUNING.known_within**2)
+        return np.asarray(self.rate * self.stretches >= KNOWN_WITHIN**2)
 
     @property
     def common(self) -> float:

@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.monitoring.tuning import TUNING
 from expdesign.vessel import stem
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS, GYRO
+
+RELATIVE_SIZE = 0.1  # change of a parameter, a gain or an inertia that matters, as a share
 
 ANGLE_RAD = 0.03  # misalignment that matters [rad]
 GYRO_SCALE = 0.03  # scale that matters: gyros are better, and a compass tells less within hours
@@ -38,7 +39,7 @@ class Change:
         return f"{value / divisor + 0.0:+.3g}{spread} {name}"
 
 
-def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) -> tuple[Change, ...]:
+def watched_changes(ship: ExtendedModel, *, size: float = RELATIVE_SIZE) -> tuple[Change, ...]:
     """Parameters of the model, inertia by equation, thrust, angles of rudders and azimuths, and the yaw-rate sensor.
 
     Args:
@@ -46,7 +47,7 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
         size: relative change of parameters, thrust and inertia that matters; of angles and the yaw-rate sensor in
             proportion.
     """
-    share = size / TUNING.relative_size
+    share = size / RELATIVE_SIZE
     model = ship.model
     loads = {kind: std / share for kind, std in LOADS}
     hull = {name for name, part in zip(model.names, ship.scaled_terms, strict=False) if part.damping}

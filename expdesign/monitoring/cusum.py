@@ -22,8 +22,10 @@ from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration
 from expdesign.monitoring.evidence import Grams, stretches_of
 from expdesign.monitoring.force import Judged, after_gap, after_stretch, judged, surprise
 from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step
-from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array
+
+# share of the size that matters for which a sum grows fastest: of changes smaller than half of it, it does not grow
+TUNED_TO = 0.6
 
 WEATHER_STRETCHES = 30.0  # over which the surprise of the force is averaged
 WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond which the weather is unlike it
@@ -107,7 +109,7 @@ def threshold(watched: int, stretches: float) -> float:
 
 def soonest(rate: Array, limit: float) -> Array:
     """Stretches from a change of the size that matters to its alarm, on average, for information of each (...)."""
-    grows = rate * TUNING.tuned_to * (1.0 - TUNING.tuned_to / 2.0)
+    grows = rate * TUNED_TO * (1.0 - TUNED_TO / 2.0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.where(grows > 0, np.ceil(limit / grows), np.inf))
 
@@ -308,7 +310,7 @@ def _summed(state: State, one: Judged, before: State, begin_s: float, calibratio
     m = score.shape[1]
     own, number = np.arange(2 * m), np.arange(2 * m) % m
     sign, inflation = np.repeat([1.0, -1.0], m), np.tile(calibration.inflation, 2)
-    size = TUNING.tuned_to
+    size = TUNED_TO
     ratios = state.ratios + (sign * score[own, number] - size / 2 * information[own, number, number]) * size / inflation
     fresh = (sign * one.score[number] - size / 2 * one.information[number, number]) * size / inflation
     late = fresh > ratios

@@ -28,5 +28,4 @@ from expdesign.roll.model import (
 from expdesign.roll.null_space import Direction, NullSpace, cures, direction, null_space, open_directions
 from expdesign.roll.problem import RollProblem, build_problem
 from expdesign.roll.runs import EFFECTS, Case, LowPass, Run, low_pass, prepared
-from expdesign.roll.tuning import TUNING
 from expdesign.vessel.roll import G_MPS2, NOMINAL, Body, Load, axis_inertia, first_moment, sensed_inertia

@@ -10,8 +10,8 @@ import numpy as np
 from expdesign.roll.instruments import Weighted, spread_of
 from expdesign.roll.model import PARAMETERS
 from expdesign.roll.problem import Moments, RollProblem, moments_of, sampled, surprise_of
+from expdesign.roll.regression import MOST_SURPRISE
 from expdesign.roll.runs import EFFECTS, Run
-from expdesign.roll.tuning import TUNING
 from expdesign.values import Array
 
 SEEN = 3.0  # standard deviations of an effect, from which it is estimated
@@ -93,7 +93,7 @@ def missed_effects(
 ) -> list[int]:
     """The effect that data show most clearly of those not among the parameters yet; all where much is missed."""
     rest = [place for place in range(len(EFFECT_NAMES)) if place not in (*added, *banned)]
-    if not added and not banned and surprise_of(left, len(problem.free)) > TUNING.most_surprise:
+    if not added and not banned and surprise_of(left, len(problem.free)) > MOST_SURPRISE:
         return rest  # which of them it is shows when none is missing
     scores = []
     for place in rest:

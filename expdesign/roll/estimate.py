@@ -49,12 +49,14 @@ from expdesign.roll.problem import (
     surprise_of,
 )
 from expdesign.roll.profile import load_interval
-from expdesign.roll.regression import flat_spectrum, spectrum
+from expdesign.roll.regression import MOST_SURPRISE, flat_spectrum, spectrum
 from expdesign.roll.tilt import TILT, tilts_of
-from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.roll import G_MPS2, Load
+
+# of instruments, below which noise alone seems to give nearly as much information, and no interval is trusted
+LEAST_STRENGTH = 1.5
 
 AT_BOUND = 1e-4  # share of the range of the search, within which of its end a parameter stands at the bound
 MOST_ROUNDS = 8  # of instruments and noise models
@@ -122,7 +124,7 @@ class RollEstimate:
     @property
     def trusted(self) -> bool:
         """Whether intervals are valid: instruments are strong, the rudder does not follow roll, and the model fits."""
-        fits = self.settled and not self.reached and not self.surprise > TUNING.most_surprise
+        fits = self.settled and not self.reached and not self.surprise > MOST_SURPRISE
         return self.method == "iv" and fits and not self.weak and not self.answering
 
     @property
@@ -133,7 +135,7 @@ class RollEstimate:
     @property
     def weak(self) -> bool:
         """Whether noise hides what the rudder does, so that the estimate leans towards least squares."""
-        return self.strength < TUNING.least_strength
+        return self.strength < LEAST_STRENGTH
 
     @property
     def answering(self) -> bool:
@@ -166,7 +168,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         before, (theta, sensed, left) = theta, solved(problem, weighted, theta, held)
         history.append(theta)
         weighed = method == "iv" and values[0] is not None
-        fits = weighed and not surprise_of(left, len(problem.free)) > TUNING.most_surprise
+        fits = weighed and not surprise_of(left, len(problem.free)) > MOST_SURPRISE
         settled = (
             len(history) > 1 and _little(problem, theta - before, sensed) and fits == (weighted[0].spread is not None)
         )

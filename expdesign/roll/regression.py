@@ -12,8 +12,12 @@ import numpy as np
 import scipy
 
 from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run, level
-from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
+
+# of the noise of roll rates to that of other signals, as they enter the equation, that are tried
+NOISE_RATIOS = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
+# least sum of squares over its expected value, beyond which intervals are not to be trusted
+MOST_SURPRISE = 3.0
 
 LARGEST_POLE = 0.999  # of these models; larger ones are moved inside
 SPECTRAL_SEGMENTS = 4  # least number of segments in all runs of a case, where spectra of residuals are estimated
@@ -261,7 +265,7 @@ def noise_model(residuals: Sequence[Array], past: Array, order: int) -> NoiseMod
     if not sum(float(e @ e) for e in residuals) > 0:
         return WHITE
     models = []
-    for rho in TUNING.noise_ratios:
+    for rho in NOISE_RATIOS:
         moving = _sensor_factor(past, rho)
         left = [scipy.signal.lfilter([1.0], moving, e) for e in residuals]
         found, innovation = _autoregression(left, order)

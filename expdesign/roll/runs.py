@@ -9,9 +9,11 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative
-from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel.roll import Load
+
+PASSED_GAIN = 0.9  # least gain of the low-pass filter at the roll frequency
+LEAST_SAMPLES_PER_PERIOD = 10.0  # of roll in the data
 
 SAMPLES_PER_PERIOD = 80.0  # of roll, at least; fewer bias the bilinear map by a share of about (pi / samples)^2 / 3
 UNWARPED_PERIODS = 3.0  # frequencies, in that of roll, up to which the bilinear map is made exact; none above twice it
@@ -119,10 +121,10 @@ def low_pass(cases: Sequence[Case], *, roll_hz: float, cutoff_hz: float | None =
         NotInformative: there are too few samples in a period of roll.
     """
     step_s = cases[0].runs[0].step_s
-    if 1.0 / (roll_hz * step_s) < TUNING.least_samples_per_period:
+    if 1.0 / (roll_hz * step_s) < LEAST_SAMPLES_PER_PERIOD:
         raise NotInformative(
             f"roll has about {roll_hz:.3g} Hz and the data have {1.0 / step_s:.3g} samples in a second, "
-            f"expected {TUNING.least_samples_per_period:g} or more in a period; record faster"
+            f"expected {LEAST_SAMPLES_PER_PERIOD:g} or more in a period; record faster"
         )
     every = max(1, int(1.0 / (roll_hz * step_s) / SAMPLES_PER_PERIOD))
     if cutoff_hz is None and every == 1:
@@ -136,10 +138,10 @@ def low_pass(cases: Sequence[Case], *, roll_hz: float, cutoff_hz: float | None =
         taps=taps, every=every, roll_hz=roll_hz, passed=_gain(taps, roll_hz, step_s),
         bandwidth_hz=_bandwidth(taps, step_s), step_s=every * step_s,
     )  # fmt: skip
-    if found.passed < TUNING.passed_gain:
+    if found.passed < PASSED_GAIN:
         raise InputError(
             f"the low-pass filter of {wanted:g} Hz leaves {100 * found.passed:.0f} % of the roll at {roll_hz:.3g} Hz, "
-            f"expected {100 * TUNING.passed_gain:.0f} % or more; leave it out, or set it to {3 * roll_hz:.2g} Hz"
+            f"expected {100 * PASSED_GAIN:.0f} % or more; leave it out, or set it to {3 * roll_hz:.2g} Hz"
         )
     return found
 

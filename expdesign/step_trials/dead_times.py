@@ -13,7 +13,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.step_trials.holds import Hold, Sailed
 from expdesign.step_trials.responses import Transient, shared_delay
 from expdesign.step_trials.samples import LEAST_GROUP, Delays, StepSample, step_samples, without_outliers
-from expdesign.step_trials.tuning import TUNING
+from expdesign.step_trials.steady_state import MOST_DELAY_S
 
 # beginning of a response to the rudder, from which its dead time is found, in time constants, and the least of it
 ENTRY_CONSTANTS, LEAST_ENTRY_SAMPLES = 2.0, 10
@@ -33,7 +33,7 @@ def samples_and_delays(
     A dead time belongs to an actuator, not to a step: it is found in each step first, and all responses are fitted anew
     with that of all. Throttle responses are of first order; rudder responses share a shape of second order.
     """
-    free = (0.0, TUNING.most_delay_s)
+    free = (0.0, MOST_DELAY_S)
     samples = step_samples(batches, holds, steady, delay_s=(free, free), progress=within(progress, 0.0, 0.5))
     delays = dead_time(samples, 0), _rudder_delay(batches, samples)
     bounds = tuple((value, value) for value, _ in delays)
@@ -71,7 +71,7 @@ def _rudder_delay(batches: Sequence[Sailed], samples: Sequence[StepSample]) -> t
     own = [one for one in samples if one.counts and one.hold.channel == 1]
     if len(own) < LEAST_GROUP:
         return dead_time(samples, 1)
-    return shared_delay([turn_entry(batches[one.hold.batch], one) for one in own], most_s=TUNING.most_delay_s)
+    return shared_delay([turn_entry(batches[one.hold.batch], one) for one in own], most_s=MOST_DELAY_S)
 
 
 def turn_entry(batch: Sailed, step: StepSample) -> Transient:

@@ -9,8 +9,12 @@ import numpy as np
 
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.signals import Batch
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, frozen_set, seal
+
+CONSTANT_SHARE = 0.02  # of a command's range, within which it counts as held
+# least_hold_s, least_hold_samples: shorter holds belong to the change of command that follows
+LEAST_HOLD_S = 3.0
+LEAST_HOLD_SAMPLES = 6
 
 CHANNELS = ("throttle", "rudder")
 """Commands; the first drives the speed U, the second the yaw rate r."""
@@ -154,7 +158,7 @@ def holds_of(batches: Sequence[Sailed]) -> tuple[Hold, ...]:
         NotInformative: there are less than three.
     """
     values = np.concatenate([batch.commands for batch in batches])
-    width = np.maximum(TUNING.constant_share * np.ptp(values, axis=0), 1e-9)
+    width = np.maximum(CONSTANT_SHARE * np.ptp(values, axis=0), 1e-9)
     ahead = throttle_sign(batches)
     found: list[Hold] = []
     for index, batch in enumerate(batches):
@@ -164,7 +168,7 @@ def holds_of(batches: Sequence[Sailed]) -> tuple[Hold, ...]:
         found += [replace(one, astern=yes or was) for one, yes, was in zip(own, gone, from_, strict=True)]
     if len(found) < 3:
         raise NotInformative(
-            f"the commands stand still in {len(found)} stretches of at least {TUNING.least_hold_s:g} s, expected three "
+            f"the commands stand still in {len(found)} stretches of at least {LEAST_HOLD_S:g} s, expected three "
             "or more: this is no step trial"
         )
     return tuple(found)
@@ -176,7 +180,7 @@ def throttle_sign(batches: Sequence[Sailed]) -> float:
 
 
 def _holds(batch: Sailed, index: int, width: Array, *, first: int) -> Iterator[Hold]:
-    least = max(TUNING.least_hold_samples, round(TUNING.least_hold_s / batch.sample_time_s))
+    least = max(LEAST_HOLD_SAMPLES, round(LEAST_HOLD_S / batch.sample_time_s))
     stretches = [part for part in _constant(batch.commands, width) if part[1] - part[0] >= least]
     before: tuple[int, tuple[float, float]] | None = None
     for number, (settled, end) in enumerate(stretches, start=first):
@@ -198,7 +202,7 @@ def signed_speed(u: Array, v: Array) -> Array:
 
 def ahead_only(batch: Sailed, sign: float) -> Sailed:
     """The longest stretch of a batch that is sailed ahead and ordered ahead: throttle times a sign, not below 0."""
-    least = -TUNING.constant_share * float(np.ptp(batch.commands[:, 0]))
+    least = -CONSTANT_SHARE * float(np.ptp(batch.commands[:, 0]))
     gone = (sign * batch.commands[:, 0] < least) | (batch.surge < -ASTERN_SHARE * batch.state[:, 0])
     if not gone.any():
         return batch
@@ -216,8 +220,8 @@ def _astern(batch: Sailed, hold: Hold, ordered: bool) -> bool:
 
 def levels_of(values: Array, sample_time_s: float) -> tuple[Array, Array]:
     """(n, m) commands that stand still in turn, of commands (k, m) at every sample, and (n,) for how long [s]."""
-    width = np.maximum(TUNING.constant_share * np.ptp(values, axis=0), 1e-9)
-    least = max(TUNING.least_hold_samples, round(TUNING.least_hold_s / sample_time_s))
+    width = np.maximum(CONSTANT_SHARE * np.ptp(values, axis=0), 1e-9)
+    least = max(LEAST_HOLD_SAMPLES, round(LEAST_HOLD_S / sample_time_s))
     parts = [part for part in _constant(values, width) if part[1] - part[0] >= least]
     levels = np.array([np.median(values[begin:end], axis=0) for begin, end in parts])
     lengths = np.array([(end - begin) * sample_time_s for begin, end in parts])

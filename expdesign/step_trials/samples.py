@@ -25,8 +25,9 @@ from expdesign.step_trials.responses import (
     fit_second_order,
     preference,
 )
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, seal
+
+STEADY_BLOCKS = 8  # of a plateau, whose means give its standard error
 
 VISIBLE_DEVIATIONS = 5.0  # change of a steady value, in its standard errors, below which a step is too small
 MISFIT = 0.2  # distance of plateau and end of transient, as a share of the step, from which they disagree
@@ -193,7 +194,7 @@ def plateau(batch: Sailed, begin: int, end: int) -> Plateau:
 
 def standard_error(values: Array) -> float:
     """Standard error of the mean of correlated values, from the means of blocks."""
-    blocks = min(TUNING.steady_blocks, len(values) // 2)
+    blocks = min(STEADY_BLOCKS, len(values) // 2)
     if blocks < 2:
         return float("inf")
     size = len(values) // blocks

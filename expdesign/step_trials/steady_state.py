@@ -26,8 +26,10 @@ import scipy
 from expdesign.errors import NotInformative
 from expdesign.step_trials.holds import Hold, Sailed
 from expdesign.step_trials.responses import Transient, fit_first_order
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
+
+MEMORY_SHARE = 0.6  # memory of the filtered signal, as a share of the slower time constants
+MOST_DELAY_S = 3.0  # dead times are sought up to this
 
 STEADY_SHARE = 1 / 3  # end of a hold that is taken as steady before any test is calibrated
 LOWER_QUANTILE, UPPER_QUANTILE = 0.9, 0.999  # of the ratio in steady data, for its thresholds
@@ -254,7 +256,7 @@ def _calibrated(
     batches: Sequence[Sailed], holds: Sequence[Hold], channel: int, constants: Sequence[float], rng: np.random.Generator
 ) -> RatioTest:
     step_s, constant_s = batches[0].sample_time_s, float(np.quantile(constants, 0.75))
-    memory_s = max(TUNING.memory_share * constant_s, LEAST_MEMORY_SAMPLES * step_s)
+    memory_s = max(MEMORY_SHARE * constant_s, LEAST_MEMORY_SAMPLES * step_s)
     ends = [_end(batches[hold.batch], hold, channel) for hold in holds if not hold.astern]
     try:
         test = calibrated(_steadiest(ends), sample_time_s=step_s, memory_s=memory_s, rng=rng)
@@ -300,7 +302,7 @@ def _rough(batch: Sailed, hold: Hold, holds: Sequence[Hold]) -> float | None:
     values = batch.state[hold.begin : hold.end, hold.channel]
     time_s = batch.time_s[: len(values)]
     data = Transient(time_s=time_s, values=values, before=float(before.mean()), after=float(after.mean()))
-    found = fit_first_order(data, delay_s=(0.0, min(TUNING.most_delay_s, float(time_s[-1]) / 4))).time_constant_s
+    found = fit_first_order(data, delay_s=(0.0, min(MOST_DELAY_S, float(time_s[-1]) / 4))).time_constant_s
     return found if found < time_s[-1] else None
 
 

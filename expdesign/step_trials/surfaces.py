@@ -15,10 +15,9 @@ import numpy as np
 import scipy
 import shapely
 
-from expdesign.step_trials.holds import CHANNELS
+from expdesign.step_trials.holds import CHANNELS, CONSTANT_SHARE
 from expdesign.step_trials.regression import Fit, Sampled, best_fit, ridge
-from expdesign.step_trials.samples import Plateau, StepSample
-from expdesign.step_trials.tuning import TUNING
+from expdesign.step_trials.samples import STEADY_BLOCKS, Plateau, StepSample
 from expdesign.values import Array, seal
 
 EVEN = ((0, 0), (1, 0), (2, 0), (0, 2), (3, 0), (1, 2), (4, 0), (2, 2), (0, 4))
@@ -220,13 +219,13 @@ def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Compa
     apart, variance = np.array(pairs).T
     weights = 1.0 / variance
     mean = float(weights @ apart / weights.sum())
-    own_variance, freedom = 1.0 / float(weights.sum()), float(len(pairs) * 2 * (TUNING.steady_blocks - 1))
+    own_variance, freedom = 1.0 / float(weights.sum()), float(len(pairs) * 2 * (STEADY_BLOCKS - 1))
     spread = float(weights @ (apart - mean) ** 2 / weights.sum()) / (len(pairs) - 1)
     if spread > own_variance and np.ptp(np.sign(apart)):
         own_variance, freedom = spread, len(pairs) - 1.0
     std = math.sqrt(own_variance)
     p_value, one = 2 * float(scipy.special.stdtr(freedom, -abs(mean) / std)), int(np.argmax(apart**2 / variance))
-    alone = 2 * float(scipy.special.stdtr(2 * (TUNING.steady_blocks - 1), -abs(apart[one]) / math.sqrt(variance[one])))
+    alone = 2 * float(scipy.special.stdtr(2 * (STEADY_BLOCKS - 1), -abs(apart[one]) / math.sqrt(variance[one])))
     place = None
     if alone * len(pairs) < p_value:
         p_value, mean, std = alone * len(pairs), float(apart[one]), math.sqrt(variance[one])
@@ -240,7 +239,7 @@ def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Compa
 def _level(one: StepSample, channel: int, own: Sequence[tuple[StepSample, Plateau]]) -> int:
     """Number of the level of a command, within the width that holds have."""
     values = [other.hold.commands[channel] for other, _ in own]
-    return round(one.hold.commands[channel] / max(TUNING.constant_share * float(np.ptp(values)), 1e-6))
+    return round(one.hold.commands[channel] / max(CONSTANT_SHARE * float(np.ptp(values)), 1e-6))
 
 
 def _pairs(own: Sequence[tuple[StepSample, Plateau]]) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:

@@ -18,6 +18,7 @@ from expdesign.diagnosis.fit.between_runs import (
     tail,
 )
 from expdesign.diagnosis.fit.cross_validation import (
+    FOLDS,
     CrossValidation,
     cross_validate,
     cross_validate_ahead,
@@ -37,6 +38,7 @@ from expdesign.diagnosis.fit.fit import (
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import (
+    BLOCK_S,
     FEWEST_RUNS,
     LEAST_ERROR,
     HeldOut,
@@ -58,11 +60,4 @@ from expdesign.diagnosis.fit.linear_model import (
     sensitivities_to,
     window_information,
 )
-from expdesign.diagnosis.fit.output_error import fit_ahead, fit_output_error, no_smaller, with_longer_windows
-from expdesign.diagnosis.fit.tuning import TUNING
-
-AHEAD_S = TUNING.ahead_s
-"""Length of the stretches that held-out data are also simulated in [s]."""
-BLOCK_S = TUNING.block_s
-"""Length of the blocks that predictions are compared in [s]."""
-FOLDS = TUNING.folds
+from expdesign.diagnosis.fit.output_error import AHEAD_S, fit_ahead, fit_output_error, no_smaller, with_longer_windows

@@ -32,14 +32,15 @@ from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.fit import Fit, FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import FEWEST_RUNS, HeldOut
-from expdesign.diagnosis.fit.output_error import FOLD_STEPS, fit_output_error
-from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.diagnosis.fit.output_error import AHEAD_S, FOLD_STEPS, fit_output_error
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import LinearisedMotion, simulate_from_measured
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
+
+FOLDS = 3  # of the cross-validation
 
 PARTS = 5  # of every run, in the cross-validation of short stretches
 
@@ -61,7 +62,7 @@ class CrossValidation:
         self._known = WeakKeyDictionary[Fit, HeldOut]()
 
     def short_windows(self, ship: ExtendedModel) -> Windows:
-        """The data in stretches of `Tuning.ahead_s`."""
+        """The data in stretches of `AHEAD_S`."""
         return _stretches(self._windows, validation_units(self._windows), ship, self._record)
 
     def of(self, found: Fit, progress: Progress = silent) -> HeldOut:
@@ -197,7 +198,7 @@ class _Folds:
 def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
     windows = given.windows
     names, parts = np.unique(given.unit), np.unique(given.part)
-    most = PARTS if given.in_stretches else TUNING.folds
+    most = PARTS if given.in_stretches else FOLDS
     folds = [names[index::most] for index in range(min(most, len(names)))]
     columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
     error = np.zeros((len(parts), len(columns)))
@@ -250,8 +251,8 @@ def error_of_constants(measured: Array, batch: Array) -> Array:
 def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Record | None) -> Windows:
     """The data in short stretches."""
     if record is not None and unit is windows.batch:
-        return cut_windows(ship.model, record, longest_s=TUNING.ahead_s)
-    return windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
+        return cut_windows(ship.model, record, longest_s=AHEAD_S)
+    return windows.cut_shorter(max(2, round(AHEAD_S / windows.sample_s)))
 
 
 def _in_time(short: Windows) -> Array:

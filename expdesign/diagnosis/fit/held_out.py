@@ -39,10 +39,11 @@ from expdesign.diagnosis.fit.linear_model import (
     start_columns,
     whitened_error,
 )
-from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import linearise, simulate_from_measured
 from expdesign.values import Array
+
+BLOCK_S = 60.0  # length of the blocks that predictions are compared in [s]
 
 LEAST_FIT = 0.0  # of simulations of whole held-out units [%]; where one is worse, the stretches count
 BOOTSTRAP_DRAWS = 1000  # of units, for intervals
@@ -57,7 +58,7 @@ class HeldOut:
     squared_error: Array  # (b, n) sum per unit and output; nan for units whose fold could not be fitted
     squared_deviation: Array  # (b, n) of the measurements from their mean, likewise
     unconverged: int = 0  # folds that kept the effects fitted to all units
-    # of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called
+    # of the same units in stretches of `AHEAD_S`, fitted and simulated when it is called
     ahead: Callable[[], HeldOut] | None = None
     # in the same stretches, by the models that simulate whole runs held out: none has seen any of the run it predicts;
     # as `ahead` where there are fewer than `FEWEST_RUNS`
@@ -362,7 +363,7 @@ def _squares(held_out: NDArray[np.bool_], ship: ExtendedModel | None, windows: W
     if ship is None:
         return np.zeros(0)
     motion = simulate_from_measured(ship, windows.selected(held_out))
-    size = max(1, round(TUNING.block_s / windows.sample_s))
+    size = max(1, round(BLOCK_S / windows.sample_s))
     if motion.diverged:
         return np.full(1, np.inf)
     moving = noise.current_std_mps > 0 and windows.has_heading

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, before_windows, linear_basis, random_current_precision, whitened
-from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (
     Disturbance,
@@ -23,6 +22,10 @@ from expdesign.diagnosis.motion import (
     term_disturbances,
 )
 from expdesign.values import Array
+
+# numbers in sensitivities and their inner products of windows that are taken together, so that memory does not grow
+# with the data
+SENSITIVITIES_AT_ONCE = 20_000_000
 
 KNOT_SPACING_S = 20.0  # of the random current, at least [s]
 MOST_KNOTS = 24  # of the random current in a window
@@ -91,7 +94,7 @@ def in_groups(linear: LinearisedMotion, count: int) -> Iterator[tuple[NDArray[np
     windows, samples = linear.motion.predicted.shape[:2]
     columns = count + 2 * MOST_KNOTS
     each = columns * (4 * samples + columns)  # sensitivities and their inner products
-    groups = min(windows, -(-windows * each // TUNING.sensitivities_at_once))
+    groups = min(windows, -(-windows * each // SENSITIVITIES_AT_ONCE))
     if groups < 2:
         yield np.ones(windows, dtype=bool), linear
         return

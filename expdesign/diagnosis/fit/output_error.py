@@ -13,11 +13,12 @@ from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.between_runs import counting_stretches
 from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, nearest_possible, uncertain_keys
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, longest_windows, simulate_from_measured, stable_windows
 from expdesign.signals import Record
 from expdesign.values import Array
+
+AHEAD_S = 30.0  # length of the stretches that held-out data are also simulated in [s]
 
 FOLD_STEPS = 6  # Gauss-Newton steps from the fit to all units to the fit without a fold
 LONGER_BY = 1.4  # factor of the length of windows from one fit of a diverging model to the next
@@ -67,7 +68,7 @@ def no_smaller(covariance: Array, other: Array) -> Array:
 
 
 def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -> tuple[ExtendedModel, Windows]:
-    """A model that leads away within `Tuning.ahead_s`, re-estimated, and windows as long as it then allows.
+    """A model that leads away within `AHEAD_S`, re-estimated, and windows as long as it then allows.
 
     It is re-estimated within the standard deviations of the vessel file: first what is impossible in it becomes
     possible (`nearest_possible`), then it is fitted in windows short enough for it, then in longer ones. Where that
@@ -77,7 +78,7 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
         ship: the model in use.
         windows: of the data, short enough for the model in use.
     """
-    if _length_s(windows) > TUNING.ahead_s or windows.steps >= longest_windows(ship, record).steps:
+    if _length_s(windows) > AHEAD_S or windows.steps >= longest_windows(ship, record).steps:
         return ship, windows
     as_given = ship, replace(windows, white_noise=True)
     if not uncertain_keys(ship):
@@ -85,16 +86,16 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
     found = nearest_possible(ship)
     length_s = _length_s(stable_windows(found, record))
     try:
-        while length_s < TUNING.ahead_s:
+        while length_s < AHEAD_S:
             found = fit_output_error(found, cut_windows(ship.model, record, longest_s=length_s), ()).ship
             length_s *= LONGER_BY
-        found = fit_output_error(found, cut_windows(ship.model, record, longest_s=TUNING.ahead_s), ()).ship
+        found = fit_output_error(found, cut_windows(ship.model, record, longest_s=AHEAD_S), ()).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return as_given
     longer = max(windows, stable_windows(found, record), key=lambda item: item.steps)
     if simulate_from_measured(found, longer).diverged:
         return as_given
-    return found, replace(longer, white_noise=_length_s(longer) <= TUNING.ahead_s)
+    return found, replace(longer, white_noise=_length_s(longer) <= AHEAD_S)
 
 
 def _length_s(windows: Windows) -> float:

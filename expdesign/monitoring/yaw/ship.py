@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.monitoring.changes import Change
+from expdesign.monitoring.changes import RELATIVE_SIZE, Change
 from expdesign.monitoring.evidence import STARTS, Grams, stretch_kinds
-from expdesign.monitoring.tuning import TUNING
 from expdesign.monitoring.yaw.estimate import LARGEST_RATE, simulate_yaw
 from expdesign.monitoring.yaw.model import SAMPLES, WORDS, YawData, YawModel, term_budget, voyages
 from expdesign.signals import Record
@@ -51,7 +50,7 @@ class YawShip:
         return np.array([self.parameters[name] for name in self.model.parameters])
 
 
-def yaw_changes(ship: YawShip, *, size: float = TUNING.relative_size) -> tuple[Change, ...]:
+def yaw_changes(ship: YawShip, *, size: float = RELATIVE_SIZE) -> tuple[Change, ...]:
     """Every parameter, and the moment of the drives.
 
     Args:

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.step_trials.holds import Controls, commands_of
-from expdesign.step_trials.tuning import TUNING
+from expdesign.step_trials.holds import CONSTANT_SHARE, Controls, commands_of
 from expdesign.values import Array
 
 Inputs = tuple[float, ...]
@@ -77,7 +76,7 @@ class StepList:
         """(2,) widths of throttle and rudder."""
         levels = np.array([self.start, *(step.after for step in self.steps)])
         ranges = np.ptp(commands_of(self.controls, self.names, levels), axis=0)
-        return np.asarray(TUNING.constant_share * ranges + 1e-9)
+        return np.asarray(CONSTANT_SHARE * ranges + 1e-9)
 
     def sailed(self, left: Sequence[Listed], before: Inputs | None, after: Inputs) -> Listed | None:
         """The first of the steps left that a change of commands is."""
@@ -108,7 +107,7 @@ def step_list(
     """
     if len(levels) < 2:
         raise InputError(f"the list of steps holds {len(levels)} levels of the commands, expected two or more")
-    width = np.maximum(TUNING.constant_share * np.ptp(levels, axis=0), 1e-9)
+    width = np.maximum(CONSTANT_SHARE * np.ptp(levels, axis=0), 1e-9)
     kept = [0, *(k for k in range(1, len(levels)) if (np.abs(levels[k] - levels[k - 1]) > width).any())]
     if len(kept) < 2:
         raise InputError("the list of steps never changes a command, expected two or more different rows")

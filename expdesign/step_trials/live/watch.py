@@ -13,13 +13,24 @@ import numpy as np
 from expdesign.errors import NotInformative
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
-from expdesign.step_trials.holds import CHANNELS, Hold, Sailed, changed_words, commands_of, signed_speed
+from expdesign.step_trials.holds import (
+    CHANNELS,
+    LEAST_HOLD_S,
+    LEAST_HOLD_SAMPLES,
+    Hold,
+    Sailed,
+    changed_words,
+    commands_of,
+    signed_speed,
+)
 from expdesign.step_trials.live import values
 from expdesign.step_trials.live.step_list import Inputs, Listed, StepList, in_sequence
 from expdesign.step_trials.live.values import Event, Finished, Held, Row, State
 from expdesign.step_trials.samples import Plateau, plateau, step_sample, with_errors
 from expdesign.step_trials.steady_state import (
     LEAST_MEMORY_SAMPLES,
+    MEMORY_SHARE,
+    MOST_DELAY_S,
     STEADY,
     advanced,
     begun,
@@ -28,7 +39,6 @@ from expdesign.step_trials.steady_state import (
     stepped,
     unseen_after_s,
 )
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
@@ -68,7 +78,7 @@ def judged(held: Held, state: State, steps: StepList) -> tuple[Plateau, str]:
         commands=(standing[0], standing[1]), changed=changed_words(held.changed),
         change=(standing[0] - known[0], standing[1] - known[1]), first=False,
     )  # fmt: skip
-    free = (0.0, TUNING.most_delay_s)
+    free = (0.0, MOST_DELAY_S)
     sample = step_sample(batch, hold, held.steady, after, before[1] if before else None, (free, free))
     return after, "; ".join(sample.problems)
 
@@ -145,7 +155,7 @@ def _calibrated(state: State, held: Held, setup: Setup) -> StateAndEvents:
     settling = int(len(held.rows) * SETTLING_SHARE)
     speed = _states(held.rows[settling:])
     rng = np.random.default_rng(setup.seed)
-    memories = [max(TUNING.memory_share * constant, LEAST_MEMORY_SAMPLES * step_s) for constant in setup.constants_s]
+    memories = [max(MEMORY_SHARE * constant, LEAST_MEMORY_SAMPLES * step_s) for constant in setup.constants_s]
     try:
         tests = tuple(
             calibrated([column], sample_time_s=step_s, memory_s=memory, rng=rng)
@@ -237,7 +247,7 @@ def _settled(state: State, setup: Setup) -> StateAndEvents:
     if not steps.same(held.rows[held.stands].inputs, now.inputs):
         held = replace(held, stands=len(held.rows) - 1)
     stood = held.rows[held.stands :]
-    if stood[-1].time_s - stood[0].time_s < TUNING.least_hold_s or len(stood) < TUNING.least_hold_samples:
+    if stood[-1].time_s - stood[0].time_s < LEAST_HOLD_S or len(stood) < LEAST_HOLD_SAMPLES:
         return replace(state, held=held), ()
     inputs = steps.level(now.inputs) or now.inputs
     before = state.before

@@ -18,7 +18,6 @@ from expdesign.progress import Progress, silent
 from expdesign.records import load_records
 from expdesign.requests import repeating
 from expdesign.roll import (
-    TUNING,
     Body,
     Case,
     LowPass,
@@ -33,6 +32,8 @@ from expdesign.roll import (
     roll_frequency,
 )
 from expdesign.roll.record import planned_everywhere, roll_run
+from expdesign.roll.regression import MOST_SURPRISE
+from expdesign.roll.runs import PASSED_GAIN
 from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import Batch
 from expdesign.vessel import RollPendulum, Vessel
@@ -209,14 +210,14 @@ def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None, b
 
 def _turned(estimate: RollEstimate) -> tuple[str, ...]:
     """A note where the model misses something, and misses nothing with the other sign of the accelerometer."""
-    if not estimate.surprise > TUNING.most_surprise:
+    if not estimate.surprise > MOST_SURPRISE:
         return ()
     cases = [
         replace(case, runs=tuple(replace(run, signals=run.signals * [1.0, -1.0, 1.0, 1.0]) for run in case.runs))
         for case in estimate.problem.cases
     ]
     other = estimate_roll(replace(estimate.problem, cases=tuple(cases)), method=estimate.method)
-    if other.surprise > TUNING.most_surprise or other.reached:
+    if other.surprise > MOST_SURPRISE or other.reached:
         return ()
     return (
         "imu_lateral_mps2 or roll_rate_radps seems to have the wrong sign, both expected positive to starboard: "
@@ -229,9 +230,9 @@ def _check_passed(estimate: RollEstimate, used: LowPass) -> None:
     """Raise where the filter takes from the roll that was found."""
     for case in estimate.problem.cases:
         found = roll_frequency(estimate.theta, estimate.problem.body, case.load)
-        if used.gain(found) < TUNING.passed_gain:
+        if used.gain(found) < PASSED_GAIN:
             raise InputError(
                 f"the low-pass filter leaves {100 * used.gain(found):.0f} % of the roll that was found, {found:.3g} Hz "
-                f"in {case.name}, expected {100 * TUNING.passed_gain:.0f} % or more; set --lowpass-hz {4 * found:.2g}, "
+                f"in {case.name}, expected {100 * PASSED_GAIN:.0f} % or more; set --lowpass-hz {4 * found:.2g}, "
                 "or period_s to what it is"
             )

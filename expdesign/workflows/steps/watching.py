@@ -12,7 +12,6 @@ import numpy as np
 from expdesign.errors import FileError, NotInformative
 from expdesign.export.monitor_content import Moment
 from expdesign.monitoring import (
-    TUNING,
     WHITE,
     Again,
     Alarm,
@@ -31,6 +30,7 @@ from expdesign.monitoring import (
     threshold,
     watch,
 )
+from expdesign.monitoring.calibration import KNOWN_WITHIN
 from expdesign.records import STREAM, Piece, Taken
 from expdesign.roll import Run
 from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_source
@@ -236,7 +236,7 @@ def calibrated(now: Watch) -> Watch:
     calibration = calibrate(joined(learnt), load=np.array([change.load for change in now.changes]))
     if not calibration.watched.any():
         best = int(np.argmax(calibration.rate))
-        larger = TUNING.known_within / np.sqrt(max(float(calibration.rate[best]) * calibration.stretches, 1e-12))
+        larger = KNOWN_WITHIN / np.sqrt(max(float(calibration.rate[best]) * calibration.stretches, 1e-12))
         raise NotInformative(
             f"the reference of {calibration.stretches} stretches of {calibration.stretch_s:g} s determines no change "
             "well enough to watch for it: take a longer one, or one with more manoeuvres, or watch for larger "
