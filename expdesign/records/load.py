@@ -37,7 +37,6 @@ from expdesign.records.pose import (
     MEASURED,
     SMOOTHED,
     VELOCITY_METHODS,
-    LocalMetres,
     Request,
     batch_velocity,
     check_agreement,
@@ -53,6 +52,7 @@ from expdesign.records.pose import (
     with_continuous_angles,
     with_metres,
 )
+from expdesign.sea_area import LocalFrame
 from expdesign.signals import AUXILIARY, Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, column_name
@@ -243,8 +243,8 @@ def _request(
 
 
 def _read(
-    path: Path, inputs: Inputs | None, origin: LocalMetres | None, limits: Mapping[str, Limit]
-) -> tuple[Table, LocalMetres | None]:
+    path: Path, inputs: Inputs | None, origin: LocalFrame | None, limits: Mapping[str, Limit]
+) -> tuple[Table, LocalFrame | None]:
     """One file in metres and radians, with every number in its range and within the limits of the actuators."""
     table = read_table(path, inputs=inputs)
     check_ranges(table)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.durations import Budget
+from expdesign.durations import Budget, Constraints
 from expdesign.errors import FileError, nearest
 from expdesign.indices import OUTCOMES
 from expdesign.input_files import check_ends
@@ -82,7 +82,9 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
     own = {
         "prior_samples": (table.prior_samples or 20) if table.robust != "nominal" else 0,
         "prior_data": named_files(table.prior_data, entry.at("prior_data")),
-        "budgets": _budgets(table.budgets, primitives, entry.at("budgets")),
+        "limits": Constraints(
+            **same_keys(table, Constraints) | {"budgets": _budgets(table.budgets, primitives, entry.at("budgets"))}
+        ),
         "tell_apart": tuple((one, other) for one, other in table.tell_apart),
         "grow": None if table.grow is None else build_grow(table.grow, entry.at("grow")),
         "accuracy": _asked(table, vessel, estimated, entry),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from expdesign.dictionary.spec import PrimitiveSpec
-from expdesign.durations import Budget
+from expdesign.durations import Constraints
 from expdesign.errors import NoPlan
 from expdesign.growing import GrowSettings
 from expdesign.plan.values import PlanSettings, UnderWay
@@ -42,14 +42,9 @@ class DesignSettings:
     prior_samples: int = 0  # models drawn from the prior
     prior: str = "none"  # prior information, "none" or "parameter_std"
     prior_data: tuple[Path, ...] = ()  # files of earlier trials, whose information is added to the prior
-    # least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`; a budget without costs is of
-    # the mean over the run of the sum of |n|^3 of all propellers and thrusters [rps3], which grows like shaft power
-    least_s: Mapping[str, float] = field(default_factory=dict)
-    most_s: Mapping[str, float] = field(default_factory=dict)
-    required: tuple[str, ...] = ()
-    excluded: tuple[str, ...] = ()
-    budgets: tuple[Budget, ...] = ()
-    balance: float = 0.0
+    # on durations; a budget without costs is of the mean over the run of the sum of |n|^3 of all propellers and
+    # thrusters [rps3], which grows like shaft power
+    limits: Constraints = field(default_factory=Constraints)
     # causes that a diagnosis of the trial must reveal; tell_apart: pairs that it must tell apart
     reveal: tuple[str, ...] = ()
     tell_apart: tuple[tuple[str, str], ...] = ()

@@ -140,7 +140,7 @@ def durations_of(scenario: str) -> Answer:
         "efficiency_uniform": design.efficiency_uniform,
         "note": design.note,
         "aside": aside,
-        "excluded": list(case.design.excluded),
+        "excluded": list(case.design.limits.excluded),
         "runs": [
             {
                 "name": item.primitive.name,

@@ -81,7 +81,7 @@ def trial(case: Scenario, folder: Path, seed: int) -> dict[str, tuple[float, flo
     rng = np.random.default_rng(seed)
     first = load_vessel(SCENARIOS / "vessels" / "fast-8m.toml").model
     truth = load_vessel(TRUTH).model.parameters
-    steps = [run for run in build_dictionary(case.vessel, case.dictionary) if run.name in case.design.required]
+    steps = [run for run in build_dictionary(case.vessel, case.dictionary) if run.name in case.design.limits.required]
     data = sailed(folder, steps, rng)
     words = ["identify-steps", *data, "--vessel", str(SCENARIOS / "vessels" / "fast-8m.toml"), "--out", str(folder)]
     if main([*words, "--quiet"]):

@@ -17,7 +17,6 @@ from expdesign.records.pose.motion import (
 )
 from expdesign.records.pose.position import (
     Fix,
-    LocalMetres,
     check_agreement,
     check_heading,
     check_jumps,

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pyproj
 import scipy
 
 from expdesign.conventions import KNOTS_PER_MPS, whole_turns
 from expdesign.errors import FileError
 from expdesign.records.file import Table, check_ranges, input_name, is_turning_input, read_table
+from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
 from expdesign.vessel import Limit
 
@@ -40,22 +40,7 @@ NOTED = ("heading_rad", "north_m")
 """Columns whose small jumps get a note; filtered velocities may change unevenly without harm."""
 
 
-@dataclass(frozen=True)
-class LocalMetres:
-    """Transverse Mercator metres around an origin, scale 1 there (WGS84)."""
-
-    # lat_deg, lon_deg: the origin
-    lat_deg: float
-    lon_deg: float
-
-    def north_east(self, lat_deg: Array, lon_deg: Array) -> tuple[Array, Array]:
-        """Metres north and east of the origin, (k,) each."""
-        place = f"+proj=tmerc +lat_0={self.lat_deg!r} +lon_0={self.lon_deg!r} +k=1 +ellps=WGS84 +units=m"
-        east, north = pyproj.Proj(place)(lon_deg, lat_deg)
-        return np.asarray(north), np.asarray(east)
-
-
-def with_metres(table: Table, origin: LocalMetres | None) -> tuple[Table, LocalMetres | None]:
+def with_metres(table: Table, origin: LocalFrame | None) -> tuple[Table, LocalFrame | None]:
     """Add north_m and east_m to a table that has latitudes and longitudes.
 
     Args:
@@ -68,8 +53,8 @@ def with_metres(table: Table, origin: LocalMetres | None) -> tuple[Table, LocalM
     if "lat_deg" not in table.columns:
         return table, origin
     lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
-    origin = origin or LocalMetres(float(lat[0]), float(lon[0]))
-    north, east = origin.north_east(lat, lon)
+    origin = origin or LocalFrame(float(lat[0]), float(lon[0]))
+    north, east = origin.to_metres(np.stack([lat, lon], axis=-1)).T
     sources = {**table.sources, "north_m": table.sources["lat_deg"], "east_m": table.sources["lon_deg"]}
     note = f"north_m and east_m are metres from lat_deg {origin.lat_deg:.7g}, lon_deg {origin.lon_deg:.7g}"
     columns = {**table.columns, "north_m": north, "east_m": east}
@@ -426,4 +411,4 @@ def _swapped(table: Table) -> Array:
     lat, lon = table.columns["lon_deg"], table.columns["lat_deg"]
     if np.abs(lat).max() >= 90:
         return table.stack("north_m", "east_m")
-    return np.stack(LocalMetres(float(lat[0]), float(lon[0])).north_east(lat, lon), axis=-1)
+    return LocalFrame(float(lat[0]), float(lon[0])).to_metres(np.stack([lat, lon], axis=-1))

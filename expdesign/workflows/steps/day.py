@@ -308,8 +308,9 @@ def _added(
 
 def _with_additions(case: Scenario, added: Sequence[PrimitiveSpec]) -> Scenario:
     """The scenario with more manoeuvres, which the optimal durations that state the accuracy go without."""
-    excluded = (*case.design.excluded, *(spec.name for spec in added))
-    return replace(case, dictionary=(*case.dictionary, *added), design=replace(case.design, excluded=excluded))
+    without = case.design.limits
+    without = replace(without, excluded=(*without.excluded, *(spec.name for spec in added)))
+    return replace(case, dictionary=(*case.dictionary, *added), design=replace(case.design, limits=without))
 
 
 def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:

@@ -141,7 +141,7 @@ def _check_excitation(case: Scenario, information: Sequence[PrimitiveInformation
         NotInformative: they do not.
     """
     settings = case.design
-    allowed = [item for item in information if item.primitive.name not in settings.excluded]
+    allowed = [item for item in information if item.primitive.name not in settings.limits.excluded]
     try:
         check_informative(allowed or information, parameters, settings.mean_subtraction)
     except NotInformative as error:
@@ -201,20 +201,14 @@ def aim_of(
 
 def constraints_of(case: Scenario, primitives: Sequence[Primitive]) -> Constraints:
     """Limits of [design]."""
-    settings = case.design
-    return Constraints(
-        least_s=settings.least_s,
-        most_s=settings.most_s,
-        required=settings.required,
-        excluded=settings.excluded,
-        budgets=tuple(
-            item
-            if item.cost_per_s
-            else replace(item, cost_per_s={run.name: cubed_propeller_speed(run) for run in primitives})
-            for item in settings.budgets
-        ),
-        balance=settings.balance,
+    limits = case.design.limits
+    budgets = tuple(
+        item
+        if item.cost_per_s
+        else replace(item, cost_per_s={run.name: cubed_propeller_speed(run) for run in primitives})
+        for item in limits.budgets
     )
+    return replace(limits, budgets=budgets)
 
 
 def cubed_propeller_speed(primitive: Primitive) -> float:

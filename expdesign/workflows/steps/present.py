@@ -234,7 +234,7 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
         NoAnswer: it can do none.
         InputError: it cannot do one that is required.
     """
-    first, settings = state.first, state.first.design
+    first, settings, limits = state.first, state.first.design, state.first.design.limits
     weather, _ = weather_for_rest(first.environment, state.ship.environment)
     if interest:
         known = estimated_parameters(state.ship.model, settings.fixed_parameters)
@@ -242,9 +242,9 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
             if name not in known:
                 raise UnknownName("parameter after --interest", name, known=known)
         settings = replace(settings, criterion="D_s", interest=tuple(dict.fromkeys(interest)))
-    kept, notes = _possible(state.ship, first.dictionary, needed={*settings.required, *settings.least_s})
+    kept, notes = _possible(state.ship, first.dictionary, needed={*limits.required, *limits.least_s})
     names = {spec.name for spec in kept}
-    if settings.least_s or settings.most_s or settings.required or settings.budgets:
+    if limits.least_s or limits.most_s or limits.required or limits.budgets:
         notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets apply to the rest of the trial.")
     accuracy = settings.accuracy
     if accuracy is not None and not state.left_stated:
@@ -258,8 +258,11 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
         total_s=first.design.total_s if accuracy else state.left_s,
         accuracy=accuracy,
         prior_data=(*settings.prior_data, *state.data),
-        most_s={name: value for name, value in settings.most_s.items() if name in names},
-        excluded=tuple(name for name in settings.excluded if name in names),
+        limits=replace(
+            limits,
+            most_s={name: value for name, value in limits.most_s.items() if name in names},
+            excluded=tuple(name for name in limits.excluded if name in names),
+        ),
     )
     case = replace(
         first,

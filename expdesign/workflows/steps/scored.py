@@ -188,18 +188,18 @@ def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes
 
 def growth_notes(case: Scenario) -> tuple[str, ...]:
     """What says which settings of [design] the search for additions ignores, if any."""
-    settings = case.design
-    limits = {
+    settings, limits = case.design, case.design.limits
+    asked_for = {
         f"criterion {settings.criterion}": settings.criterion != "D",
         f"predictor {settings.predictor}": settings.predictor != "model",
         f"robust {settings.robust}": settings.robust != "nominal",
         "prior": settings.prior != "none" or bool(settings.prior_data),
-        "times": bool(settings.least_s or settings.most_s or settings.required or settings.excluded),
-        "budgets": bool(settings.budgets),
-        "balance": bool(settings.balance),
+        "times": bool(limits.least_s or limits.most_s or limits.required or limits.excluded),
+        "budgets": bool(limits.budgets),
+        "balance": bool(limits.balance),
         "reveal": bool(settings.reveal or settings.tell_apart),
     }
-    asked = [name for name, is_asked in limits.items() if is_asked]
+    asked = [name for name, is_asked in asked_for.items() if is_asked]
     if not asked:
         return ()
     return (
