@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from expdesign.export.roll_page import RollContent, headline, parameter_rows, roll_sentences
-from expdesign.roll import Body, RollEstimate, metacentric_height, null_space
+from expdesign.roll import Body, RollEstimate, metacentric_height, null_space, stiffness
+from expdesign.roll.model import parameters
+from expdesign.roll.profile import _with_mass
 from expdesign.roll.record import levelled
 from expdesign.roll.runs import EFFECTS, LowPass
 from plain_roller import GM_M, MASS_KG, SENSOR_HEIGHT_M, STEP_S, Sea, estimated, height_deviations, run
@@ -41,6 +43,15 @@ def test_damping_by_the_square_is_estimated_and_costs_no_answer() -> None:
 def test_a_rudder_set_by_the_clock_does_not_answer_roll() -> None:
     """A helm by the clock foresees itself, and what a model misses follows the rudder; neither is an answer."""
     assert not found(0, Sea(zigzag_s=12.0, quadratic=0.08, run_s=FEW_S)).answering
+
+
+def test_chance_alone_takes_no_answer_from_a_calm_sea() -> None:
+    """Where the rudder does nearly all, what would follow from an answer is small; one in 20 would be said."""
+    one = replace(found(0, Sea(quadratic=0.5, run_s=FEW_S)), unanswered=0.02)
+    assert one.strength > 10.0
+    assert not one.answering
+    assert replace(one, unanswered=0.0005).answering
+    assert replace(one, strength=5.0).answering
 
 
 @pytest.mark.thorough
@@ -84,6 +95,42 @@ def test_a_load_is_positive_and_its_interval_longer_above_than_below_in_waves() 
     low, high = one.load_interval
     assert 0.0 <= low <= one.values["m"] <= high
     assert high - one.values["m"] > one.values["m"] - low
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", [40001, 40005, 40012])
+def test_the_profile_of_a_load_rises_as_slowly_as_the_data_say(seed: int) -> None:
+    """A search for parameters beside another mass that begins with the height of this one ends beside the profile.
+
+    Of these trials, whose loads are told by little, the interval began at 6.3 to 27.7 t, where 5 t were on board.
+    """
+    one = found(seed, Sea(roll_deg=1.0))
+    assert one.trusted
+    assert inside(one, Sea().load[0])
+
+
+def test_a_load_of_another_mass_has_the_same_moment_about_the_axis() -> None:
+    body, theta = Body(mass_kg=MASS_KG, z_g=0.4, z_s=-4.0), parameters(k=1e6, A_x=1e6, z_f=0.3, m=4000.0, z_m=-5.0)
+    rights = [stiffness(_with_mass(theta, mass), body, None) for mass in (1000.0, 4000.0, 9000.0)]
+    assert rights == pytest.approx([stiffness(theta, body, None)] * 3, rel=1e-12)
+
+
+@pytest.mark.thorough
+def test_weights_of_a_poor_fit_do_not_lead_the_search_away() -> None:
+    """They followed the parameters while damping by the square was missing, and the search ended at no upright ship."""
+    sea = Sea(zigzag_s=12.0, quadratic=0.08)
+    one = found(40003, sea)
+    assert one.trusted
+    assert inside(one, sea.load[0])
+
+
+@pytest.mark.thorough
+def test_a_search_that_ends_at_bounds_says_so_and_gives_no_interval_of_the_load() -> None:
+    """Rounding made the variance of a mass of nothing negative."""
+    one = found(40004, Sea(roll_deg=1.0))
+    assert (np.diag(one.covariance) >= 0).all()
+    assert not one.trusted
+    assert (one.load_interval is None) == ("m" in one.reached)
 
 
 def test_metacentric_heights_are_within_what_is_stated() -> None:

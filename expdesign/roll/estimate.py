@@ -59,9 +59,11 @@ from expdesign.vessel.roll import G_MPS2, Load
 LEAST_STRENGTH = 1.5
 
 AT_BOUND = 1e-4  # share of the range of the search, within which of its end a parameter stands at the bound
-MOST_ROUNDS = 8  # of instruments and noise models
+MOST_ROUNDS, WAVERING = 12, 8  # of instruments and noise models, and after which of them every other step is halved
 SETTLED = 0.1  # change in a round, in standard deviations of each parameter, that ends them
-LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
+# chance without feedback, below which the rudder is said to answer roll; and where instruments are so strong that an
+# answer moves the estimate by a small part of what it would move least squares
+LEAST_UNANSWERED, LEAST_UNANSWERED_STRONG, STRONG = 0.05, 0.001, 10.0
 LEAST_ROUNDS = 3  # before effects are looked for
 MOST_SCANS = 3  # of all tilts
 BY_TILT = ("d", "K_r", "K_vd", "K_delta")  # parameters that an unknown tilt moves
@@ -140,7 +142,7 @@ class RollEstimate:
     @property
     def answering(self) -> bool:
         """Whether the rudder answers what rolls the ship, so that it is no instrument."""
-        return self.unanswered < LEAST_UNANSWERED
+        return self.unanswered < (LEAST_UNANSWERED_STRONG if self.strength > STRONG else LEAST_UNANSWERED)
 
 
 def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
@@ -167,11 +169,13 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         weighted = [weighted_equations(case, own, one, follows=fits) for case, own, one in parts]
         before, (theta, sensed, left) = theta, solved(problem, weighted, theta, held)
         history.append(theta)
-        weighed = method == "iv" and values[0] is not None
+        weighed, following = method == "iv" and values[0] is not None, weighted[0].spread is not None
         fits = weighed and not surprise_of(left, len(problem.free)) > MOST_SURPRISE
-        settled = (
-            len(history) > 1 and _little(problem, theta - before, sensed) and fits == (weighted[0].spread is not None)
-        )
+        if following and not fits and len(history) < MOST_ROUNDS:
+            # where the model misses something, weights that follow are least at parameters that hide it, far away
+            theta = before
+            continue
+        settled = len(history) > 1 and _little(problem, theta - before, sensed) and fits == following
         by = by_effects(problem, weighted, theta)
         more, std = missing_sizes(problem, by, sensed, left, added)
         settled = settled and bool((np.abs(more) <= 2 * SETTLED * std).all())
@@ -195,7 +199,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
             added, settled = [*added, *new], settled and not new and not unseen
         if settled or len(history) >= MOST_ROUNDS * (1 + bool(added) + (TILT in added)):
             break
-        share = 0.5 if len(history) > MOST_ROUNDS and len(history) % 2 else 1.0  # rounds may go back and forth
+        share = 0.5 if len(history) > WAVERING and len(history) % 2 else 1.0  # rounds may go back and forth
         if added:
             more, _ = missing_sizes(problem, by, sensed, left, added)
             problem = with_effects(problem, added, share * more)
@@ -300,7 +304,8 @@ def _covariance(
         return np.asarray(middle * np.outer(scale, scale))
     inverse = np.linalg.pinv(_curvature(problem, weighted, theta, gone) * np.outer(scale, scale), rcond=1e-10)
     freedom = min(spectrum(residuals).freedom for residuals in noise_of(problem, weighted, theta))
-    middle = inverse @ (sensed * scale).T @ (sensed * scale) @ inverse / (1.0 - 2.0 / freedom) ** 2
+    moved = inverse @ (sensed * scale).T / (1.0 - 2.0 / freedom)  # its square has no negative variance by rounding
+    middle = moved @ moved.T
     return np.asarray(middle * np.outer(scale, scale))
 
 

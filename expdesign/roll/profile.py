@@ -14,6 +14,8 @@ from expdesign.roll.problem import RollProblem, residuals_of, solved
 from expdesign.values import Array
 
 CHI2_95 = 3.841  # of one degree of freedom
+STRIDE = 1.5  # from mass to mass, on the way to the ends
+LEAST_SHARE = 0.01  # of a typical load, below which there may be none
 
 
 def load_interval(
@@ -38,38 +40,45 @@ def load_interval(
     std = math.sqrt(float(covariance[own, own]))
     plain = sensed * problem.scale[problem.places]
     least = math.sqrt(max(float(np.linalg.pinv(plain.T @ plain, rcond=1e-12)[own, own]), 0.0)) * problem.scale[place]
-    if not (0 < std < math.inf and least > 0):
+    here, highest = float(theta[place]), float(problem.bounds[1][place])
+    lowest = LEAST_SHARE * float(problem.scale[place])
+    if not (0 < std < math.inf and least > 0 and lowest < here < highest):
         return None
-    low, high = problem.bounds
     enough = CHI2_95 * (std / least) ** 2
     best = _cost(problem, weighted, theta, gone)
-    found = {float(theta[place]): np.array(theta)}
-    known: dict[float, float] = {float(theta[place]): -enough}
+    found: dict[float, Array] = {here: np.array(theta)}
+    known: dict[float, float] = {here: -enough}
 
     def excess(mass: float) -> float:
         if mass in known:  # a second search, begun elsewhere, may end elsewhere
             return known[mass]
-        nearest = found[min(found, key=lambda other: abs(other - mass))]
-
-        begin = np.array(nearest)
-        begin[place] = mass
-        found[mass], _, left = solved(problem, weighted, begin, [*held, "m"], beside=gone, within=1e-8)
+        nearest = min(found, key=lambda other: float(abs(math.log(other / mass))))
+        found[mass], _, left = solved(
+            problem, weighted, _with_mass(found[nearest], mass), [*held, "m"], beside=gone, within=1e-8
+        )
         known[mass] = float(left @ left) - best - enough
         return known[mass]
 
     ends = []
-    for side, bound in ((-1.0, float(low[place])), (1.0, float(high[place]))):
-        near = far = float(theta[place])
-        for factor in (1.0, 2.0, 4.0, 8.0, 16.0):
-            far = float(np.clip(theta[place] + side * factor * std, low[place], high[place]))
-            if far == bound or excess(far) > 0:
-                break
-            near = far
-        if (far == bound and excess(far) <= 0) or excess(far) <= 0:
-            ends.append(0.0 if side < 0 else math.inf)
-        else:
-            ends.append(float(scipy.optimize.brentq(excess, near, far, rtol=1e-3)))
+    for factor, open_end in ((1.0 / STRIDE, 0.0), (STRIDE, math.inf)):
+        near = far = here
+        while excess(far) <= 0 and lowest < far * factor < highest:
+            near, far = far, far * factor
+        ends.append(open_end if excess(far) <= 0 else float(scipy.optimize.brentq(excess, near, far, rtol=1e-3)))
     return ends[0], ends[1]
+
+
+def _with_mass(theta: Array, mass: float) -> Array:
+    """Parameters (9,) with another mass where the load's moment about the axis of rotation stays.
+
+    That moment is what the data tell best. From the height of another mass a search may end beside the profile, which
+    then seems to rise at once.
+    """
+    found = np.array(theta)
+    m, axis, z = (PARAMETERS.index(name) for name in ("m", "z_f", "z_m"))
+    found[z] = (theta[z] + theta[axis]) * theta[m] / mass - theta[axis]
+    found[m] = mass
+    return found
 
 
 def _cost(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, gone: Array) -> float:
