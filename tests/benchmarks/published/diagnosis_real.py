@@ -40,6 +40,7 @@ from diagnosis_real_faults import (
     of_instruments,
     of_model,
     oracle,
+    slew_times,
 )
 from diagnosis_real_hulls import HULLS, WINDY, averaged, fitted_vessel, runs, trial_of
 from diagnosis_real_table import found_words, read_log, seconds_words, sorted_rows, told_faults
@@ -214,7 +215,8 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
     except NoAnswer as error:
         return row | {"named": "", "verdict": f"no answer: {error}", "findings": [], "seconds": 0.0, "seen": None}
     row |= row_of(found, time.process_time() - begin)
-    own_size = of_instruments(trial.judged) | of_model(vessel, clean, {*OF_MODEL} & {*dict(effects)})
+    own_size = of_model(vessel, clean, {*OF_MODEL} & {*dict(effects)}, slew_times(found))
+    own_size |= of_instruments(trial.judged)
     row["named"], row["off"] = answer(injected, found, effects, own_size)
     row["doubts"] = list(getattr(own, "faults", ()))
     row["seen"] = [kinematics_see(clean, faulty) if injected.batch else False, None]

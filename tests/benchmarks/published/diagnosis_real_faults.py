@@ -9,7 +9,7 @@ Beside the diagnosis stand two tests that know what to look for, and say whether
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -256,19 +256,23 @@ def of_instruments(record: Record) -> dict[str, float]:
     return {"gyro": gyro - 1.0, "log": float(scale) - 1.0, "lever:forward": float(-arm), "late:u": float(-late)}
 
 
-def of_model(vessel: Vessel, record: Record, effects: Iterable[str]) -> dict[str, float]:
+def of_model(vessel: Vessel, record: Record, effects: Iterable[str], beside: Mapping[str, float]) -> dict[str, float]:
     """What of these a model lacks on untouched records already, each by the likelihood alone.
 
     A ship needs some angle to sail straight, another one on another day. Least squares make a dead time: their
     differences from sample to sample are those of a ship a little later than she is, or sooner. Less than no dead time
-    is no effect, so that it is found beside orders that are made early by `LEAD_S`, which no fault is.
+    is no effect, so that it is found beside orders that are made early by `LEAD_S`, which no fault is. A slew rate also
+    makes the ship late: what she lacks beside another one than the file's is another dead time.
+
+    Args:
+        beside: effects that the model has instead of those of the file.
     """
     found = {}
     for key in effects:
         sample_s = record.batches[0].sample_time_s
         lead_s = round(LEAD_S / sample_s) * sample_s if key.startswith("delay:") else 0.0
         data = replace(record, batches=tuple(_ahead(batch, lead_s) for batch in record.batches))
-        ship = extended_model(vessel, data).with_effects({key: lead_s} if lead_s else {})
+        ship = extended_model(vessel, data).with_effects({**beside, **({key: lead_s} if lead_s else {})})
         windows = stable_windows(ship, data)
         found[key] = float(fit(ship, windows, (key,), starts=fitted_start(ship, windows)).value(key)) - lead_s
     return found
@@ -329,6 +333,12 @@ def answer(
         if np.isfinite(true.get(key, np.nan))
     ]
     return ("first" if causes[0] in right else "among"), max(off, default=None)
+
+
+def slew_times(found: Diagnosis) -> dict[str, float]:
+    """Those that were found, by effect."""
+    pairs = (pair for item in found.findings for pair in estimates(item, found).items())
+    return {key: value for key, (value, _) in pairs if key.startswith("slew:")}
 
 
 def estimates(item: Finding, found: Diagnosis) -> dict[str, tuple[float, float]]:
