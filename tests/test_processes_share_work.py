@@ -33,6 +33,9 @@ def jobs(request: pytest.FixtureRequest) -> Iterator[int]:
         yield request.param
 
 
+KEPT = []  # what a process keeps
+
+
 def refuse(reason):
     raise NoPlan(reason)
 
@@ -90,6 +93,21 @@ def fail_between(work):
 
 
 @pytest.mark.usefixtures("jobs")
+def grown_by(megabytes):
+    """The process, and how many such things it keeps by now."""
+    KEPT.append(np.ones(megabytes * 125_000))
+    time.sleep(0.6)  # loky looks once a second
+    return os.getpid(), len(KEPT)
+
+
+def test_a_process_that_keeps_what_it_built_goes_on():
+    pytest.importorskip("psutil", reason="without it loky does not know how large a process is")
+    with local_processes(2):
+        found = list(in_order(grown_by, (), [(1,), (1,), *[(150,)] * 6]))
+    assert len({process for process, _ in found}) == 2  # not replaced
+    assert max(kept for _, kept in found) >= 4  # one of them has grown by 450 MB or more, over loky's 300
+
+
 def test_results_come_in_the_order_of_the_tasks():
     assert list(in_order(add, (10,), ((number,) for number in range(7)))) == list(range(10, 17))
     assert list(in_order(add, (), [])) == []

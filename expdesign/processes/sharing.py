@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import cloudpickle
 from joblib import cpu_count
-from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky import ProcessPoolExecutor, process_executor
 from joblib.externals.loky.backend.resource_tracker import ensure_running
 from joblib.externals.loky.backend.utils import kill_process_tree
 
@@ -51,6 +51,9 @@ ONE_AT_A_TIME = threading.Lock()
 """Held by the task of this process: solvers and their random numbers are not made for threads."""
 IDLE_S = 300.0
 """After which processes without work end, so that none outlives a program that was killed."""
+GROWN_BYTES = 2_000_000_000
+"""By which a process may grow before another takes its place: programs that are built once are kept, which is no leak.
+"""
 
 
 def outcome_of(both: bytes, task: bytes) -> bytes:
@@ -106,7 +109,7 @@ class Processes:
                 with suppress(BrokenProcessPool):
                     return self._executor.submit(outcome_of, both, task)
             _track_quietly()
-            self._executor = ProcessPoolExecutor(max_workers=self.count, timeout=IDLE_S)
+            self._executor = ProcessPoolExecutor(max_workers=self.count, timeout=IDLE_S, initializer=_may_grow)
             return self._executor.submit(outcome_of, both, task)
 
     def wait(self, ended: SimpleQueue[int]) -> int:
@@ -134,6 +137,11 @@ class Processes:
                     with suppress(ProcessLookupError):
                         kill_process_tree(process)
             self._executor.shutdown()
+
+
+def _may_grow() -> None:
+    """Let this process grow; loky, where it knows how large it is, would end it from 300 MB on."""
+    process_executor._MAX_MEMORY_LEAK_SIZE = GROWN_BYTES
 
 
 def _track_quietly() -> None:
