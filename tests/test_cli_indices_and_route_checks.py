@@ -80,9 +80,9 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(["indices", "--vessel", str(TUG), "--speed-mps", "30", "--out", str(tmp_path)]) == 2
     assert "cannot hold 30 m/s" in capsys.readouterr().err
     assert main(["indices", "--vessel", str(TUG), "--scale", "0.5"]) == 2
-    assert "--scale is 0.5" in capsys.readouterr().err
+    assert "--scale is 0.5, expected at least 1" in capsys.readouterr().err
     assert main(["indices", "--vessel", str(TUG), "--sea-state", "10"]) == 2
-    assert "expected a whole number from 0 to 9" in capsys.readouterr().err
+    assert "--sea-state is 10, expected at least 0 and at most 9" in capsys.readouterr().err
     (tmp_path / "bad.gpx").write_text("<gpx/>")
     assert main(["check-route", str(tmp_path / "bad.gpx")]) == 2
     assert "expected gpx 1.1" in capsys.readouterr().err

@@ -11,6 +11,7 @@ import pytest
 from design_case import example_dictionary, vessel
 from expdesign.estimation.methods import METHODS
 from expdesign.export import estimate_page
+from expdesign.export.document import Table
 from expdesign.export.validation_page import biased, judgements, off_theory, surely_biased
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
@@ -113,7 +114,7 @@ def test_methods_that_are_advised_are_methods(method: str, environment: Environm
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_runs_are_said_to_be_simulated_in_the_measured_wind_where_a_method_uses_it(method, monkeypatch):
-    monkeypatch.setattr(estimate_page, "fit_table", lambda found: (("Run",), []))
+    monkeypatch.setattr(estimate_page, "fit_table", lambda found: Table(header=("Run",), rows=[]))
     found = SimpleNamespace(methods=(SimpleNamespace(method=method),))
     assert ("in the measured wind" in estimate_page._fit(found).blocks[0]) is method.weather.wind
 

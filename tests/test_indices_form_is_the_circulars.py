@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from lxml import html
@@ -9,10 +10,11 @@ from markupsafe import Markup
 
 from expdesign.errors import InputError
 from expdesign.export import words
-from expdesign.export.indices_form import Held, IndicesContent
+from expdesign.export.indices_form import IndicesContent
 from expdesign.export.indices_page import condition_rows, form_rows, indices_document, ship_rows
 from expdesign.export.pages import document_html
 from expdesign.indices import Circle, criteria, standard_results
+from expdesign.requests import Indices
 from expdesign.vessel import Vessel
 from nomoto_ship import nomoto_ship
 
@@ -87,22 +89,23 @@ def test_ship_data_are_the_vessels_and_data_without_a_file_stay_open() -> None:
 @pytest.mark.parametrize(
     ("held", "met"),
     [
-        (Held(), (None, None, None)),
-        (Held(depth_m=40.0, wind_mps=10.7, sea_state=4), (False, True, True)),
-        (Held(depth_m=40.1, wind_mps=10.8, sea_state=5), (True, False, False)),
+        ({}, (None, None, None)),
+        ({"depth_m": 40.0, "wind_mps": 10.7, "sea_state": 4}, (False, True, True)),
+        ({"depth_m": 40.1, "wind_mps": 10.8, "sea_state": 5}, (True, False, False)),
     ],
 )
 def test_conditions_are_judged_by_four_draughts_beaufort_five_and_sea_state_four(
-    held: Held, met: tuple[bool | None, ...]
+    held: dict[str, float], met: tuple[bool | None, ...]
 ) -> None:
-    marks = [Markup(row[3]).striptags() for row in condition_rows(content(held=held))[:3]]
+    marks = [Markup(row[3]).striptags() for row in condition_rows(content(**held))[:3]]
     assert marks == [{None: "", True: "\N{CHECK MARK}", False: "\N{BALLOT X} exceeds"}[one] for one in met]
 
 
 @pytest.mark.parametrize("wrong", [{"depth_m": 0.0}, {"wind_mps": -1.0}, {"sea_state": 10}])
 def test_conditions_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=r"expected"):
-        Held(**wrong)
+    (name,) = wrong
+    with pytest.raises(InputError, match=f"--{name.replace('_', '-')} is .*, expected"):
+        Indices(vessel=Path("ship.toml"), **wrong)
 
 
 def test_odd_names_are_shown_and_never_run() -> None:

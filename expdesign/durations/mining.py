@@ -17,7 +17,6 @@ from math import comb
 import numpy as np
 
 from expdesign.durations.concave import Collected, symmetric_part
-from expdesign.durations.criteria import Aim
 from expdesign.durations.limits import NO_CONSTRAINTS, Constraints
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.rounding import ADDED_SHARE
@@ -55,7 +54,6 @@ def best_subset(
     *,
     size: int,
     mean_subtraction: str = "complete",
-    aim: Aim | None = None,
 ) -> Subset:
     """Rank recorded batches and choose `size` of them for re-estimation.
 
@@ -67,7 +65,6 @@ def best_subset(
         parameters: names in the order of their matrices.
         size: number of batches to choose.
         mean_subtraction: "none", "batch" or "complete".
-        aim: criterion with its settings; D when not given.
 
     Raises:
         InputError: the size is not from 1 to the number of batches.
@@ -75,7 +72,7 @@ def best_subset(
     """
     if not 1 <= size <= len(batches):
         raise InputError(f"{size} of {len(batches)} batches cannot be chosen, expected 1 to {len(batches)}")
-    problem, collected = _pool(batches, parameters, mean_subtraction, aim or Aim())
+    problem, collected = _pool(batches, parameters, mean_subtraction)
     shares = problem.run_s / problem.total_s
     order = _greedy(collected, shares)
     exact = comb(len(batches), size) <= ALL_SUBSETS
@@ -107,7 +104,6 @@ def build_recorded(
     run_s: Array,
     total_s: float,
     mean_subtraction: str = "complete",
-    aim: Aim | None = None,
     constraints: Constraints = NO_CONSTRAINTS,
 ) -> DurationProblem:
     """The duration problem of recorded primitives, from the moments of their data.
@@ -118,7 +114,6 @@ def build_recorded(
         run_s: (q,) duration of one whole run of each [s].
         total_s: total time of all primitives [s].
         mean_subtraction: "none", "batch" or "complete".
-        aim: criterion with its settings; D when not given.
         constraints: limits on the durations.
     """
     return DurationProblem(
@@ -128,13 +123,12 @@ def build_recorded(
         matrices=np.array([batch.bordered(mean_subtraction) for batch in batches]),
         run_s=run_s,
         total_s=total_s,
-        aim=aim or Aim(),
         constraints=constraints,
     )
 
 
 def _pool(
-    batches: Sequence[BatchInformation], parameters: Sequence[str], mean_subtraction: str, aim: Aim
+    batches: Sequence[BatchInformation], parameters: Sequence[str], mean_subtraction: str
 ) -> tuple[DurationProblem, Collected]:
     """All batches as primitives of one run each, in their total time, and the criterion."""
     samples = np.array([float(batch.samples) for batch in batches])
@@ -144,13 +138,12 @@ def _pool(
         run_s=samples,
         total_s=float(samples.sum()),
         mean_subtraction=mean_subtraction,
-        aim=aim,
     )
     definite = replace(problem, matrices=symmetric_part(problem.matrices))
     try:
         return definite, Collected.of(definite)
     except NotInformative:
-        if problem.symmetric or aim.criterion != "D":
+        if problem.symmetric:
             raise
     collected = Collected.of(problem)
     if not np.isfinite(collected.value(samples / samples.sum())):

@@ -205,12 +205,15 @@ def _margin(inside: Polynomial, worst: WorstCase, windy: bool) -> float:
     return sum(abs(factor) * bounds.get(name, 0.0) for (name,), factor in inside.terms.items())
 
 
-def _spans(rows: Integers, most: int = 5) -> str:
+MOST_SPANS = 5  # stretches of rows that a sentence lists
+
+
+def _spans(rows: Integers) -> str:
     """Rows in short: "3 to 14, 20, 31 to 33 and 7 more stretches"."""
     edges = np.flatnonzero(np.diff(rows) > 1) + 1
     stretches = np.split(rows, edges)
-    texts = [f"{part[0]}" if len(part) == 1 else f"{part[0]} to {part[-1]}" for part in stretches[:most]]
-    more = f" and {len(stretches) - most} more stretches" if len(stretches) > most else ""
+    texts = [f"{part[0]}" if len(part) == 1 else f"{part[0]} to {part[-1]}" for part in stretches[:MOST_SPANS]]
+    more = f" and {len(stretches) - MOST_SPANS} more stretches" if len(stretches) > MOST_SPANS else ""
     return ", ".join(texts) + more
 
 

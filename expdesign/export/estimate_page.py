@@ -19,20 +19,14 @@ from expdesign.export.estimate_figures import autocorrelation_figure, interval_f
 from expdesign.export.files import (
     breach_sentences,
     disturbance_table,
-    estimate_warnings,
+    estimate_values,
     failure_rows,
-    fit_entries,
     fit_table,
-    limit_entries,
     limit_table,
     motion_words,
-    parameter_entries,
     parameter_table,
-    prediction_entries,
     prediction_table,
-    prediction_title,
-    rows_entry,
-    steered_entry,
+    rows_by_equation,
     unstable_warning,
 )
 from expdesign.vessel import NOT_ACTING_BACK, Vessel, VesselModel
@@ -140,40 +134,12 @@ def estimate_document(found: Assessment, ship: Vessel) -> Document:
             *_runs(found),
             _residuals(found),
             *_methods(found),
-            section("Current and wind", _table(disturbance_table(found), texts=3), DISTURBANCES),
+            section("Current and wind", disturbance_table(found), DISTURBANCES),
             section("Samples used", used_samples(found)),
             section("Methods without an estimate", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
         ),
         notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(found)),
     )
-
-
-def estimate_values(found: Assessment) -> dict[str, object]:
-    """More numbers, for JSON."""
-    return {
-        **({"why": found.why} if found.why else {}),
-        "parameters_of": found.motion,
-        "what_limits_the_fit": limit_entries(found),
-        "methods_left_out": list(found.left_out),
-        "methods": {
-            item.method.name: {
-                "parameters": parameter_entries(item),
-                "horizon_s": item.horizon_s,
-                "predictions": prediction_entries(found, item),
-                "fit": fit_entries(item),
-                "samples_used": item.estimate.residuals.rows,
-                "samples_used_by_equation": rows_entry(item),
-                "steered": steered_entry(item),
-                "warnings": len(estimate_warnings(found, item)),
-            }
-            for item in found.methods
-        },
-    }
-
-
-def _table(headed: tuple[tuple[str, ...], list[tuple[str, ...]]], *, texts: int = 1, title: str = "") -> Table:
-    header, rows = headed
-    return Table(title=title, header=header, rows=rows, texts=texts)
 
 
 def _parameters(found: Assessment, model: VesselModel) -> Section:
@@ -185,11 +151,10 @@ def _parameters(found: Assessment, model: VesselModel) -> Section:
         shaded=chosen,
         on="page",
     )
-    title, (header, rows) = "Estimates, with standard deviations", parameter_table(found)
     return section(
         "Parameters",
         of_page,
-        Table(title=title, header=header, rows=rows, on="terminal"),
+        parameter_table(found),
         f"{motion_words(found)} The model is in {model.form} form. The shaded column is written to the "
         "vessel file. The standard deviations account for correlated residuals. They measure random error only, not "
         "errors of the model structure.",
@@ -204,8 +169,8 @@ def _parameters(found: Assessment, model: VesselModel) -> Section:
 def _choice(found: Assessment) -> Iterator[Section]:
     """Which estimate to use."""
     yield section("Which estimate to use", *notes_of(advice(found)), Items(METHODS_IN_WORDS))
-    predictions = _table(prediction_table(found), title=prediction_title(found))
-    yield section(prediction_title(found), predictions, PREDICTIONS, level=3)
+    predictions = prediction_table(found)
+    yield section(predictions.title, predictions, PREDICTIONS, level=3)
     broken = [
         *sample_notes(found.best.estimate.residuals),
         *breach_sentences(found.best.breaches, len(found.record.batches)),
@@ -222,17 +187,16 @@ def _fit(found: Assessment) -> Section:
         f"Each run is simulated from its first measured velocity with the measured inputs, {still}. 100 % is a perfect "
         "fit. 0 % is as good as the mean of the measured velocity. Negative values are possible. A real current, "
         "sensor noise and the accumulation of errors in long runs all lower the fit, even of a perfect model.",
-        _table(fit_table(found), texts=2, title="Fit of the simulated output to the measured one, in per cent"),
+        fit_table(found),
     )
 
 
 def _limits(found: Assessment) -> Section:
-    header, rows = limit_table(found)
     return section(
         f"Causes of misfit of {found.best.method.name}",
         MISFIT,
         Table(header=LIMIT_HEADER, rows=limit_rows(found), texts=2, on="page"),
-        Table(header=header, rows=rows, texts=2, on="terminal"),
+        limit_table(found),
     )
 
 
@@ -307,7 +271,7 @@ def used_samples(found: Assessment) -> Table:
         (
             item.method.name,
             str(item.estimate.residuals.rows),
-            ", ".join(f"d{name}/dt {count}" for name, count in rows_entry(item).items()),
+            ", ".join(f"d{name}/dt {count}" for name, count in rows_by_equation(item).items()),
             str(steered.samples),
             STEERED_WORDS[steered.treatment] if steered.samples else "",
         )

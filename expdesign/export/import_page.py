@@ -49,24 +49,20 @@ class ImportContent:
     vessel: str  # file that was given, or a word for one
 
 
-def channel_rows(content: ImportContent) -> list[tuple[str, ...]]:
-    """One for each channel that is used, in the order of the columns' names."""
+def channel_table(content: ImportContent) -> Table:
+    """A row for each channel that is used, in the order of the columns' names."""
     uses = sorted((use for use in content.mapping.uses if use.column), key=lambda use: (use.column, use.file))
-    return [
-        (use.column, _channel(content, use.file, use.channel), use.unit or "-", _times(use.scale, use.offset), use.why)
+    rows = [
+        (
+            use.column, use.channel if len(content.logs) == 1 else f"{use.file}: {use.channel}", use.unit or "-",
+            f"{use.scale:.5g}" + (f" {use.offset:+.5g}" if use.offset else ""), use.why,
+        )
         for use in uses
     ]  # fmt: skip
+    return Table(header=("Column", "Channel", "Unit", "Times", "Why"), rows=rows, texts=5)
 
 
-def _times(scale: float, offset: float) -> str:
-    return f"{scale:.5g}" + (f" {offset:+.5g}" if offset else "")
-
-
-def _channel(content: ImportContent, file: str, channel: str) -> str:
-    return channel if len(content.logs) == 1 else f"{file}: {channel}"
-
-
-def unused_rows(content: ImportContent) -> list[tuple[str, ...]]:
+def unused_table(content: ImportContent) -> Table:
     """Log, channels or texts that are not used, and why; those of one reason together."""
     groups: dict[tuple[str, str], list[str]] = {}
     for use in content.mapping.uses:
@@ -77,7 +73,8 @@ def unused_rows(content: ImportContent) -> list[tuple[str, ...]]:
             groups.setdefault((log.source, "not a reading of the ship's motion, or without a clock"), []).extend(
                 log.unused
             )
-    return [(file, _listed(names), why) for (file, why), names in groups.items()]
+    rows = [(file, _listed(names), why) for (file, why), names in groups.items()]
+    return Table(header=("Log", "Channel", "Why"), rows=rows, texts=3)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -85,14 +82,15 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_TEXTS]) + (f" and {more} more" if more > 0 else "")
 
 
-def run_rows(content: ImportContent) -> list[tuple[str, ...]]:
+def run_table(content: ImportContent) -> Table:
     """File, what it is, when it begins, how long it lasts, and how long its approach is."""
     step_s = content.sampled.sample_time_s
-    return [
+    rows = [
         (name, run.family, moment(content, float(run.stretch.time_s[0])), f"{len(run.stretch) * step_s:.4g}",
          f"{run.approach_s:.4g}")
         for name, run in zip(content.files, content.runs, strict=True)
     ]  # fmt: skip
+    return Table(header=("File", "What", "Begins", "Lasts s", "Approach s"), rows=rows, texts=3)
 
 
 def moment(content: ImportContent, time_s: float) -> str:
@@ -102,12 +100,13 @@ def moment(content: ImportContent, time_s: float) -> str:
     return datetime.fromtimestamp(time_s, UTC).strftime("%Y-%m-%d %H:%M:%S")
 
 
-def response_rows(content: ImportContent) -> list[tuple[str, ...]]:
+def response_table(content: ImportContent) -> Table:
     """Signal, slew rate, lag, dead time and what is left, each with its standard error."""
-    return [
+    rows = [
         (one.signal, _followed(one.rate), _followed(one.lag_s), _followed(one.delay_s), f"{one.rest:.2g}")
         for one in content.followed
     ]
+    return Table(header=("Signal", "Rate per second", "Lag s", "Dead time s", "Left"), rows=rows)
 
 
 def _followed(value: tuple[float, float] | None) -> str:
@@ -230,13 +229,13 @@ def import_document(content: ImportContent, folder: Path) -> Document:
         section("Rejected", Table(header=("Where", "Why"), rows=content.rejected, texts=2)),
         section(
             "Channels that are used",
-            Table(header=("Column", "Channel", "Unit", "Times", "Why"), rows=channel_rows(content), texts=5),
+            channel_table(content),
             "mapping.toml holds these decisions. Change what is wrong, and import again with --map mapping.toml.",
         ),
-        section("Not used", Table(header=("Log", "Channel", "Why"), rows=unused_rows(content), texts=3)),
+        section("Not used", unused_table(content)),
         section(
             "How actuators follow their orders",
-            Table(header=("Signal", "Rate per second", "Lag s", "Dead time s", "Left"), rows=response_rows(content)),
+            response_table(content),
             "Fitted to orders and positions reached; instruments.toml has them, and other "
             "commands use them where the vessel file says nothing.",
         ),
@@ -259,7 +258,7 @@ def import_document(content: ImportContent, folder: Path) -> Document:
         sections=(
             section(
                 "Runs",
-                Table(header=("File", "What", "Begins", "Lasts s", "Approach s"), rows=run_rows(content), texts=3),
+                run_table(content),
                 Figure(draw=partial(_track, content), caption="Way over ground; runs in colour."),
                 Figure(
                     draw=partial(_series, content),

@@ -4,43 +4,20 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from expdesign.errors import InputError
 from expdesign.export import words
 from expdesign.export.files import strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
 from expdesign.vessel import Vessel
-from expdesign.vessel.vessel import SEA_STATES
 
 KINDS = {Circle: "turning circle", ZigZag: "zig-zag", Stop: "stopping", NotStandard: "no standard trial"}
 Found = Circle | ZigZag | Stop | NotStandard
 VERDICT_WORDS = ("met", "not met", "open", "no result")
 OTHER_SPEED = 0.05
 """Difference of approach speeds, by the simulation's, above which measured and simulated results are no comparison."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Held:
-    """Depth and weather of the measured trials; None where it is not stated.
-
-    Raises:
-        InputError: a depth that is not positive, a negative wind, a code that there is not.
-    """
-
-    depth_m: float | None = None  # of the water
-    wind_mps: float | None = None  # mean speed of the true wind
-    sea_state: int | None = None  # code of the World Meteorological Organization, 0 to 9
-
-    def __post_init__(self) -> None:
-        if self.depth_m is not None and not 0 < self.depth_m < math.inf:
-            raise InputError(f"depth is {self.depth_m:g} m, expected more than 0")
-        if self.wind_mps is not None and not 0 <= self.wind_mps < math.inf:
-            raise InputError(f"wind is {self.wind_mps:g} m/s, expected 0 or more")
-        if self.sea_state is not None and self.sea_state not in SEA_STATES:
-            raise InputError(f"sea state is {self.sea_state}, expected a whole number from 0 to 9")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,7 +30,10 @@ class IndicesContent:
     simulated_why_not: str  # why it cannot, or ""
     measured: tuple[Found, ...]  # results of measured runs
     notes: tuple[str, ...]  # remarks on the files, one sentence each
-    held: Held = field(default_factory=Held)  # depth and weather of the measured trials
+    # of the measured trials, where it is stated: depth of the water, mean speed of the true wind, sea state by its code
+    depth_m: float | None = None
+    wind_mps: float | None = None
+    sea_state: int | None = None
 
     @property
     def trials(self) -> tuple[tuple[str, Circle | ZigZag | Stop], ...]:
@@ -186,7 +166,7 @@ def indices_json(content: IndicesContent) -> str:
                 }
                 for source, verdict in content.verdicts
             ],
-            "held": asdict(content.held),
+            "held": {"depth_m": content.depth_m, "wind_mps": content.wind_mps, "sea_state": content.sea_state},
             "notes": list(content.notes),
         }
     )

@@ -244,27 +244,27 @@ def _length_by_speed(content: IndicesContent) -> str:
 
 def condition_rows(content: IndicesContent) -> list[tuple[str, ...]]:
     """Condition, value, limit and verdict of the measured trials; what was not stated stays open."""
-    held, draught = content.held, content.vessel.draught_m
-    ratio = None if held.depth_m is None else held.depth_m / draught
-    force = None if held.wind_mps is None else beaufort(held.wind_mps)
+    draught, depth_m, wind_mps, sea = content.vessel.draught_m, content.depth_m, content.wind_mps, content.sea_state
+    ratio = None if depth_m is None else depth_m / draught
+    force = None if wind_mps is None else beaufort(wind_mps)
     return [
         (
             "Water depth / mean draught",
-            "" if ratio is None else f"{held.depth_m:g} m / {draught:g} m = {ratio:.1f}",
+            "" if ratio is None else f"{depth_m:g} m / {draught:g} m = {ratio:.1f}",
             f"more than {DEPTH_BY_DRAUGHT:g}",
             "" if ratio is None else _kept(ratio > DEPTH_BY_DRAUGHT),
         ),
         (
             "Wind",
-            "" if force is None else f"{speed(held.wind_mps or 0.0)}, Beaufort {force}",
+            "" if force is None else f"{speed(wind_mps or 0.0)}, Beaufort {force}",
             f"Beaufort {STRONGEST_WIND} at most",
             "" if force is None else _kept(force <= STRONGEST_WIND),
         ),
         (
             "Sea state",
-            "" if held.sea_state is None else f"{held.sea_state}",
+            "" if sea is None else f"{sea}",
             f"{HIGHEST_SEA} at most",
-            "" if held.sea_state is None else _kept(held.sea_state <= HIGHEST_SEA),
+            "" if sea is None else _kept(sea <= HIGHEST_SEA),
         ),
         ("Place and date", "", "", ""),
     ]

@@ -15,10 +15,6 @@ from expdesign.export.words import counted, ship
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
 
-CASE_HEADER = ("Case", "Load", "Runs", "Manoeuvres", "Time [s]")
-PRECISION_HEADER = ("Parameter", "Meaning", "Value", "Std before", "Std after, at least", "Unit")
-STEP_HEADER = ("Load cases", "Loads", "Efficiency", "Smallest relative sensitivity")
-
 HARDLY = 0.5
 """Relative standard deviation from which a parameter is said to be hardly determined."""
 
@@ -48,21 +44,21 @@ class LoadContent:
         return sum(count * self.plan.manoeuvres[name] for name, count in self.runs(case).items())
 
 
-def case_rows(content: LoadContent) -> list[tuple[str, ...]]:
-    """One for each load case."""
+def case_table(content: LoadContent) -> Table:
+    """A row for each load case."""
     rows: list[tuple[str, ...]] = []
     for case, option in enumerate(content.options):
         runs = content.runs(case)
         each = ", ".join(f"{name} {count}x" if count > 1 else name for name, count in runs.items())
         rows.append((str(case + 1), option.name, str(sum(runs.values())), each, f"{content.time_s(case):.0f}"))
-    return rows
+    return Table(header=("Case", "Load", "Runs", "Manoeuvres", "Time [s]"), rows=rows, texts=4)
 
 
-def precision_rows(content: LoadContent) -> list[tuple[str, ...]]:
-    """One for each parameter that is sought."""
+def precision_table(content: LoadContent) -> Table:
+    """A row for each parameter that is sought."""
     plan = content.plan
     values = plan.question.theta[plan.question.places]
-    return [
+    rows = [
         (
             name, MEANINGS[name], f"{value:.4g}", f"{before:.2g}" if math.isfinite(before) else "unknown",
             f"{after:.2g}", UNITS[name],
@@ -71,12 +67,14 @@ def precision_rows(content: LoadContent) -> list[tuple[str, ...]]:
             plan.question.free, values, plan.std_before, plan.std_after, strict=True
         )
     ]  # fmt: skip
+    header = ("Parameter", "Meaning", "Value", "Std before", "Std after, at least", "Unit")
+    return Table(header=header, rows=rows, texts=2)
 
 
-def step_rows(content: LoadContent) -> list[tuple[str, ...]]:
-    """One for each number of load cases, the plan's marked."""
+def step_table(content: LoadContent) -> Table:
+    """A row for each number of load cases, the plan's marked."""
     plan = content.plan
-    return [
+    rows = [
         (
             f"{len(step.options)}, chosen" if step is plan.chosen else str(len(step.options)),
             "; ".join(plan.question.options[place].name for place in step.options),
@@ -84,6 +82,7 @@ def step_rows(content: LoadContent) -> list[tuple[str, ...]]:
         )
         for step in plan.steps
     ]  # fmt: skip
+    return Table(header=("Load cases", "Loads", "Efficiency", "Smallest relative sensitivity"), rows=rows, texts=2)
 
 
 def load_sentences(content: LoadContent) -> Iterator[str]:
@@ -216,21 +215,21 @@ def load_document(content: LoadContent) -> Document:
         sections=(
             section(
                 "Load cases, in this order",
-                Table(header=CASE_HEADER, rows=case_rows(content), texts=4),
+                case_table(content),
                 "Heights are above the origin of the vessel file\u2019s heights. Every run begins upright, on a "
                 "steady straight course.",
             ),
             section("Each load case is planned on the chart by itself", Listing(content.commands)),
             section(
                 "What the trial will tell",
-                Table(header=PRECISION_HEADER, rows=precision_rows(content), texts=2),
+                precision_table(content),
                 "Standard deviations before the trial are those of the vessel file. Those after it are lower "
                 f"bounds: they count the noise of the sensors and {waves}, but not what the model of roll "
                 "misses, and an estimate by instruments reaches them only in part.",
             ),
             section(
                 "How many load cases",
-                Table(header=STEP_HEADER, rows=step_rows(content), texts=2),
+                step_table(content),
                 "A plan with an efficiency of 0.9 needs 1/0.9 of the time for the information of the best plan "
                 "with all loads. The relative sensitivity is that of the equations along the combination of "
                 "parameters that they determine least. At 0.01 a coefficient changes by 1 % while the "

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.export.document import Table
 from expdesign.export.files import finite, strict_json
 from expdesign.export.words import counted
 from expdesign.step_trials import CHANNELS, NO_BEND, StepSample, StepTrial, Surface
@@ -18,7 +19,6 @@ from expdesign.vessel import Vessel, column_name
 SIGNIFICANT = 0.01  # p-value below which asymmetry and hysteresis are reported as found
 
 
-REPEAT_HEADER = ("Step", "Begins at", "Throttle", "Rudder", "Why")
 STATES = ("speed", "yaw rate")
 STATE_UNITS = ("m/s", "rad/s")
 
@@ -178,18 +178,13 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
         yield f"No sign of {' or '.join(kinds)} at the level of {SIGNIFICANT:g}."
 
 
-def repeat_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
-    """Under `REPEAT_HEADER`."""
-    return [
-        (
-            str(one.hold.number),
-            f"{begins_s(content, one):.0f} s",
-            _to(one, 0),
-            _to(one, 1),
-            "; ".join(one.problems),
-        )
+def repeat_table(content: StepTrialContent) -> Table:
+    """Steps to be sailed again, and why."""
+    rows = [
+        (str(one.hold.number), f"{begins_s(content, one):.0f} s", _to(one, 0), _to(one, 1), "; ".join(one.problems))
         for one in to_repeat(content)
     ]
+    return Table(header=("Step", "Begins at", "Throttle", "Rudder", "Why"), rows=rows, texts=5)
 
 
 def _to(one: StepSample, channel: int) -> str:
@@ -203,23 +198,12 @@ def _order(value: float) -> str:
     return f"{round(value, 6) + 0.0:.3g}"
 
 
-STEP_HEADER = (
-    "Step",
-    "Throttle",
-    "Rudder",
-    "Steady after",
-    "U [m/s]",
-    "r [rad/s]",
-    "Turns",
-    "Time constant",
-    "Inertia",
-    "Remarks",
-)
-
-
-def step_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
-    """Every hold, under `STEP_HEADER`."""
-    return [_step_row(content, one) for one in content.trial.samples]
+def step_table(content: StepTrialContent) -> Table:
+    """Every hold, on the page."""
+    header = ("Step", "Throttle", "Rudder", "Steady after", "U [m/s]", "r [rad/s]", "Turns", "Time constant",
+              "Inertia", "Remarks")  # fmt: skip
+    rows = [_step_row(content, one) for one in content.trial.samples]
+    return Table(header=header, rows=rows, texts=10, on="page")
 
 
 def constant_std_s(content: StepTrialContent, one: StepSample) -> float:
@@ -244,15 +228,17 @@ def _step_row(content: StepTrialContent, one: StepSample) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def nominal_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
-    """Parameter, value before and value after, with standard deviations."""
+def nominal_table(content: StepTrialContent) -> Table:
+    """Parameter, value before and value after, with standard deviations; no rows without a vessel file."""
+    header = ("Parameter", "Before", "After the steps")
     if content.before is None or content.nominal is None:
-        return []
+        return Table(header=header, rows=[])
     before, after = content.before.model, content.nominal.model
     columns = (before.names, before.parameters, before.parameter_std, after.parameters, after.parameter_std)
-    return [
+    rows = [
         (name, _pair(value, std), _pair(found, left)) for name, value, std, found, left in zip(*columns, strict=True)
     ]
+    return Table(header=header, rows=rows, texts=3)
 
 
 def _pair(value: float, std: float) -> str:

@@ -12,19 +12,17 @@ import numpy as np
 from markupsafe import Markup
 
 from expdesign import __version__
-from expdesign.export.document import Document, Figure, Table, filled, section
+from expdesign.export.document import Document, Figure, filled, section
 from expdesign.export.files.text import csv_text, strict_json
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, svg
 from expdesign.export.step_trial_content import (
-    REPEAT_HEADER,
-    STEP_HEADER,
     StepTrialContent,
     Validated,
     command_units,
-    nominal_rows,
-    repeat_rows,
+    nominal_table,
+    repeat_table,
     sentences,
-    step_rows,
+    step_table,
     to_repeat,
     unit_of,
 )
@@ -311,7 +309,7 @@ def step_trial_document(content: StepTrialContent) -> Document:
             },
         },
         sections=filled(
-            section("Steps to repeat", Table(header=REPEAT_HEADER, rows=repeat_rows(content), texts=5)),
+            section("Steps to repeat", repeat_table(content)),
             section(
                 "Where the model holds",
                 Figure(
@@ -331,10 +329,10 @@ def step_trial_document(content: StepTrialContent) -> Document:
             section("Simulation", *(_simulation(content, place, part) for place, part in enumerate(shown))),
             section(
                 "Nominal vessel",
-                Table(header=("Parameter", "Before", "After the steps"), rows=nominal_rows(content), texts=3),
+                nominal_table(content),
                 NOMINAL,
             ),
-            section("All steps", Table(header=STEP_HEADER, rows=step_rows(content), texts=10, on="page")),
+            section("All steps", step_table(content)),
         ),
         notes=content.notes,
     )

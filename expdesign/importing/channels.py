@@ -179,7 +179,6 @@ def channels_of(
     *,
     source: str,
     units: Mapping[str, str] | None = None,
-    prefix: str = "",
     what: str = "",
 ) -> tuple[list[Channel], list[str]]:
     """Channels of a table whose rows (k,) share a clock, and notes on it; readings that are no numbers are left out."""
@@ -195,7 +194,7 @@ def channels_of(
             unit = (units or {}).get(name, "")
             # most channels of a table have all readings, and then share its times
             times_of, own = (times, own) if known.all() else (times[known], own[known])
-            found.append(Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own))
+            found.append(Channel(name=name, source=source, unit=unit, time_s=times_of, values=own))
     notes += [f"{', '.join(beyond)}: readings beyond {LARGEST:g} are left out"] * bool(beyond)
     return found, notes
 

@@ -304,6 +304,10 @@ class Diagnose(Request):
     seed: StatedSeed = 0
 
 
+MOST_WIND_MPS = 100.0
+"""Of a mean wind; no trial is held in more."""
+
+
 class Indices(Request):
     """Compute turning, zig-zag and stopping indices, simulated and measured, beside their IMO limits.
 
@@ -320,14 +324,23 @@ class Indices(Request):
         float | None,
         Option(metavar="V", help="Approach speed of the simulated trials. Default: 85 % power."),
     ] = None
-    scale: Annotated[float, Option(metavar="S", help="Ship length by model length, for trials of a model.")] = 1.0
+    scale: Annotated[
+        float, Option(metavar="S", min=1.0, help="Ship length by model length, for trials of a model.")
+    ] = 1.0
     antenna_forward_m: Annotated[
         float,
         Option(metavar="X", help="Distance of the antenna forward of amidships [m]."),
     ] = 0.0
-    depth_m: Annotated[float | None, Option(metavar="D", help="Depth of the water in the measured trials [m].")] = None
-    wind_mps: Annotated[float | None, Option(metavar="W", help="Mean true wind in the measured trials [m/s].")] = None
-    sea_state: Annotated[int | None, Option(metavar="N", help="Sea state in the measured trials, 0 to 9.")] = None
+    depth_m: Annotated[
+        float | None, Option(metavar="D", over=0.0, help="Depth of the water in the measured trials [m].")
+    ] = None
+    wind_mps: Annotated[
+        float | None,
+        Option(metavar="W", min=0.0, max=MOST_WIND_MPS, help="Mean true wind in the measured trials [m/s]."),
+    ] = None
+    sea_state: Annotated[
+        int | None, Option(metavar="N", min=0, max=9, help="Sea state in the measured trials, by its code.")
+    ] = None
     out: OutByVessel = None
 
 

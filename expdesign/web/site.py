@@ -224,8 +224,8 @@ def shown_job(site: Site, job: Job, *, ended: Callable[[Job], None] | None = Non
     timer = ui.timer(REFRESH_S, refresh)
 
 
-def page_of(name: str, *, tall: bool = True) -> None:
+def page_of(name: str) -> None:
     """A page of results inside this one, and alone."""
     address = f"/folder/{quote(name)}"
     ui.link(f"Open {name} alone", address, new_tab=True)
-    ui.element("iframe").props(f'src="{address}" title="{name}"').classes("inside tall" if tall else "inside")
+    ui.element("iframe").props(f'src="{address}" title="{name}"').classes("inside")

@@ -15,24 +15,17 @@ if TYPE_CHECKING:
     )
     from expdesign.export.files.estimates import (
         breach_sentences,
-        disturbance_entries,
         disturbance_table,
         estimate_json,
-        estimate_warnings,
+        estimate_values,
         estimated_vessel,
         failure_rows,
-        fit_entries,
         fit_table,
-        limit_entries,
         limit_table,
         motion_words,
-        parameter_entries,
         parameter_table,
-        prediction_entries,
         prediction_table,
-        prediction_title,
-        rows_entry,
-        steered_entry,
+        rows_by_equation,
         unstable_warning,
     )
     from expdesign.export.files.plan_files import (

@@ -18,6 +18,7 @@ from expdesign.estimation.disturbance import MeasuredWind, Moments
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
 from expdesign.export import words
+from expdesign.export.document import Table
 from expdesign.export.files.text import finite, named_finite, strict_json
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.values import Array
@@ -48,8 +49,8 @@ def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
     return [*entries, *([] if found.wind is None else [_wind_entry(found.wind)])]
 
 
-def disturbance_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: one for each disturbance that a method estimates."""
+def disturbance_table(found: Assessment) -> Table:
+    """A row for each disturbance that a method estimates."""
     rows = []
     for item in found.methods:
         for own in _moments_of(item):
@@ -68,7 +69,7 @@ def disturbance_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[st
                     *(", ".join(f"{value:.3g}" for value in pair) for pair in values),
                 )
             )
-    return HEADER, rows
+    return Table(header=HEADER, rows=rows, texts=3)
 
 
 def meaning(own: Moments) -> str:
@@ -97,9 +98,9 @@ def _moments_entry(own: Moments, *, steady: bool) -> dict[str, Any]:
     return {
         "of": "current" if own.of == "current" else f"current and wind in d{own.of}/dt",
         "meaning": meaning(own),
-        "mean_mps": _named(DIRECTIONS, own.mean, std[:2]),
-        "second_moments_m2ps2": _named(SECOND, own.second, std[2:4]) if seen else None,
-        "covariance_m2ps2": _named(CENTRAL, own.central, std[4:]) if seen else None,
+        "mean_mps": _valued(DIRECTIONS, own.mean, std[:2]),
+        "second_moments_m2ps2": _valued(SECOND, own.second, std[2:4]) if seen else None,
+        "covariance_m2ps2": _valued(CENTRAL, own.central, std[4:]) if seen else None,
         "not_told": UNSEEN if seen else (CONSTANT if steady else TOGETHER),
     }
 
@@ -112,13 +113,6 @@ def _wind_entry(wind: MeasuredWind) -> dict[str, Any]:
         "mean_mps": dict(zip(DIRECTIONS, wind.mean.tolist(), strict=True)),
         "covariance_m2ps2": {"north_north": nn, "north_east": ne, "east_east": ee},
         "samples": wind.samples,
-    }
-
-
-def _named(names: tuple[str, ...], values: Array, stds: Array) -> dict[str, dict[str, float | None]]:
-    return {
-        name: {"value": finite(value), "std": finite(std)}
-        for name, value, std in zip(names, values.tolist(), stds.tolist(), strict=True)
     }
 
 
@@ -169,25 +163,30 @@ def breach_sentences(breaches: Sequence[Breach], runs: int) -> list[str]:
     return sentences
 
 
-def parameter_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: parameters down, methods across, value and standard deviation in each cell."""
+def parameter_table(found: Assessment) -> Table:
+    """Parameters down, methods across, value and standard deviation in each cell, for a terminal."""
     names = [name for name in found.best.model.names if any(name in item.estimate.names for item in found.methods)]
     rows = [(name, *(_cell(item, name) for item in found.methods)) for name in names]
-    return ("parameter", *(item.method.name for item in found.methods)), rows
+    header = ("parameter", *(item.method.name for item in found.methods))
+    return Table(title="Estimates, with standard deviations", header=header, rows=rows, on="terminal")
 
 
-def fit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: runs down, methods across, fit of every output in per cent in each cell."""
+def fit_table(found: Assessment) -> Table:
+    """Runs down, methods across, fit of every output in per cent in each cell."""
     outputs = " ".join(found.best.model.outputs)
     rows = [
         (run.batch.name, run.use, *(_fits(item.runs[index]) for item in found.methods))
         for index, run in enumerate(found.best.runs)
     ]
-    return ("run", "use", *(f"{item.method.name}: {outputs}" for item in found.methods)), rows
+    header = ("run", "use", *(f"{item.method.name}: {outputs}" for item in found.methods))
+    title = "Fit of the simulated output to the measured one, in per cent"
+    return Table(title=title, header=header, rows=rows, texts=2)
 
 
-def prediction_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: errors of predictions by method, in per cent of the standard deviation, the best first."""
+def prediction_table(found: Assessment) -> Table:
+    """Errors of predictions by method, in per cent of the standard deviation, the best first."""
+    of = "runs left out of the estimate" if all(item.unseen for item in found.compared) else "the runs used"
+    title = f"Errors of predictions {AHEAD_S:g} s ahead of {of}, in per cent of the standard deviation"
     rows = [
         (
             item.label if item.bounded else f"{item.label}, runs away",
@@ -196,18 +195,12 @@ def prediction_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str
         )
         for item in (found.compared[place] for place in ranked(found.compared))
     ]
-    return ("method", *found.best.model.outputs, "together"), rows
+    return Table(title=title, header=("method", *found.best.model.outputs, "together"), rows=rows)
 
 
 def failure_rows(found: Assessment) -> list[tuple[str, ...]]:
     """Methods that gave no estimate, or were not tried, and why."""
     return [*((label, str(error)) for label, error in found.failures), *(("oe", note) for note in found.notes)]
-
-
-def prediction_title(found: Assessment) -> str:
-    """What that table shows."""
-    of = "runs left out of the estimate" if all(item.unseen for item in found.compared) else "the runs used"
-    return f"Errors of predictions {AHEAD_S:g} s ahead of {of}, in per cent of the standard deviation"
 
 
 def _error(share: float) -> str:
@@ -218,10 +211,11 @@ def _error(share: float) -> str:
     return f"{100 * share:.1f}"
 
 
-def limit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: one sentence for each run."""
+def limit_table(found: Assessment) -> Table:
+    """One sentence for each run, for a terminal."""
     pairs = zip(found.limits, found.best.runs, strict=True)
-    return ("run", "cause of misfit"), [(run.batch.name, sentence(limits, run)) for limits, run in pairs]
+    rows = [(run.batch.name, sentence(limits, run)) for limits, run in pairs]
+    return Table(header=("run", "cause of misfit"), rows=rows, texts=2, on="terminal")
 
 
 def motion_words(found: Assessment) -> str:
@@ -254,12 +248,56 @@ def estimate_json(found: Assessment, vessel: Vessel) -> str:
     return strict_json({item.method.name: _method_entry(found, item, vessel) for item in found.methods})
 
 
+def estimate_values(found: Assessment) -> dict[str, Any]:
+    """Numbers of all methods in short."""
+    return {
+        **({"why": found.why} if found.why else {}),
+        "parameters_of": found.motion,
+        "what_limits_the_fit": limit_entries(found),
+        "methods_left_out": list(found.left_out),
+        "methods": {
+            item.method.name: {
+                "parameters": shared["parameters"],
+                "horizon_s": shared["horizon_s"],
+                "predictions": shared["predictions"],
+                "fit": shared["fit"],
+                "samples_used": item.estimate.residuals.rows,
+                "samples_used_by_equation": rows_by_equation(item),
+                "steered": shared["steered"],
+                "warnings": len(estimate_warnings(found, item)),
+            }
+            for item in found.methods
+            for shared in (_shared_entry(found, item),)
+        },
+    }
+
+
+def _shared_entry(found: Assessment, item: Assessed) -> dict[str, Any]:
+    """What both say of a method."""
+    steered = item.estimate.steered
+    return {
+        "parameters": _valued(item.estimate.names, item.estimate.values, item.estimate.std),
+        "horizon_s": item.horizon_s,
+        # label of method and horizon -> errors of predictions of what was left out, over standard deviations
+        "predictions": {
+            own.label: {**named_finite(own.outputs, own.shares), "together": finite(own.share), "unseen": own.unseen}
+            for own in found.compared
+            if own.method is item.method
+        },
+        "fit": _per_run(item.runs, "fit_percent"),
+        "steered": {
+            "samples": steered.samples, "of": steered.of,
+            "treatment": steered.treatment if steered.samples else None,
+        },
+    }  # fmt: skip
+
+
 def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str, Any]:
-    estimate, model = item.estimate, vessel.model
+    estimate, model, shared = item.estimate, vessel.model, _shared_entry(found, item)
     q = len(estimate.nuisance_values)
     return {
         "title": item.method.title,
-        "parameters": parameter_entries(item),
+        "parameters": shared["parameters"],
         "held": dict(estimate.held),
         "nuisance": _valued(
             estimate.nuisance_names,
@@ -268,18 +306,18 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         ),
         "current_to": _current(item),
         "disturbances": disturbance_entries(item),
-        "horizon_s": item.horizon_s,
-        "predictions": prediction_entries(found, item),
+        "horizon_s": shared["horizon_s"],
+        "predictions": shared["predictions"],
         "form": model.form,
         "parameters_of": found.motion,
         "prior": found.prior,
         "sample_time_s": found.record.batches[0].sample_time_s,
-        "fit": fit_entries(item),
+        "fit": shared["fit"],
         "rmse": _per_run(item.runs, "rmse"),
         "not_simulated": {run.batch.name: run.problem for run in item.runs if run.problem},
         "one_step_r2": named_finite(item.one_step.outputs, item.one_step.explained),
         "residuals": _residual_entry(item),
-        "steered": steered_entry(item),
+        "steered": shared["steered"],
         "feedback_test": _feedback(item),
         "null_space": {
             "singular_values": [finite(value) for value in estimate.null_space.singular_values.tolist()],
@@ -292,25 +330,6 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         "what_limits_the_fit": limit_entries(found) if item is found.best else None,
         "data": _data(found),
     }
-
-
-def parameter_entries(item: Assessed) -> dict[str, Any]:
-    """{name: {value, std}} of the estimated parameters."""
-    return _valued(item.estimate.names, item.estimate.values, item.estimate.std)
-
-
-def prediction_entries(found: Assessment, item: Assessed) -> dict[str, Any]:
-    """{method with horizon: errors over standard deviations} of predictions of what was left out."""
-    return {
-        own.label: {**named_finite(own.outputs, own.shares), "together": finite(own.share), "unseen": own.unseen}
-        for own in found.compared
-        if own.method is item.method
-    }
-
-
-def fit_entries(item: Assessed) -> dict[str, Any]:
-    """Fit of the simulated output [per cent] by use, run and output."""
-    return _per_run(item.runs, "fit_percent")
 
 
 def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
@@ -368,22 +387,16 @@ def _residual_entry(item: Assessed) -> dict[str, Any]:
         "std": named_finite(found.outputs, found.std),
         "correlation_with_sample_before": named_finite(found.outputs, found.correlation),
         "rows": found.rows,
-        "rows_by_equation": rows_entry(item),
+        "rows_by_equation": rows_by_equation(item),
         "left_out": found.left_out,
         "lags_in_covariance": found.lags,
     }
 
 
-def rows_entry(item: Assessed) -> dict[str, int]:
+def rows_by_equation(item: Assessed) -> dict[str, int]:
     """Samples that each equation used."""
     found = item.estimate.residuals
     return dict(zip(found.outputs, found.rows_of.tolist(), strict=True))
-
-
-def steered_entry(item: Assessed) -> dict[str, Any]:
-    """Number of samples marked as steered, of all, and what became of them."""
-    found = item.estimate.steered
-    return {"samples": found.samples, "of": found.of, "treatment": found.treatment if found.samples else None}
 
 
 def _feedback(item: Assessed) -> dict[str, Any] | None:

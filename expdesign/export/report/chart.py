@@ -335,10 +335,13 @@ def _with_bow(hull_b: Array, least_length_m: float) -> Array:
     return np.array([[x, 0], [0.4 * x, y], [-x, y], [-x, -y], [0.4 * x, -y]])
 
 
-def _heading_marks(pose: Array, count: int = 14) -> list[int]:
+MARKS = 14  # of headings along a track
+
+
+def _heading_marks(pose: Array) -> list[int]:
     """Samples spread evenly over the distance sailed."""
     sailed = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
-    places = np.linspace(0.0, sailed[-1], count + 2)[1:-1]
+    places = np.linspace(0.0, sailed[-1], MARKS + 2)[1:-1]
     return [int(sample) for sample in np.searchsorted(sailed, places)]
 
 

@@ -360,10 +360,6 @@ def _log(path: Path, found: Mapping[tuple[str, str, int], Series], unread: Count
         numbers = np.array(values)[order]
         channels.append(Channel(name=name, source=path.name, unit=unit, time_s=own, values=numbers))
     if "Engine starboard.rpm" in best:
-        channels = [_renamed(channel, "Engine.rpm", "Engine port.rpm") for channel in channels]
+        channels = [replace(one, name="Engine port.rpm") if one.name == "Engine.rpm" else one for one in channels]
     unused = tuple(f"{name} ({count})" for name, count in unread.most_common())
     return Log(source=path.name, clock=clock, channels=tuple(channels), notes=tuple(notes), unused=unused)
-
-
-def _renamed(channel: Channel, old: str, new: str) -> Channel:
-    return replace(channel, name=new) if channel.name == old else channel

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.export.indices_form import Held, IndicesContent, indices_json
+from expdesign.export.indices_form import IndicesContent, indices_json
 from expdesign.export.indices_page import indices_document
 from expdesign.indices import StandardResults, measured_trial, standard_results
 from expdesign.indices.measured import Found
@@ -24,9 +24,6 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
 
     Depth of the water, mean true wind and sea state are those of the measured trials, for the form.
     """
-    held = Held(depth_m=request.depth_m, wind_mps=request.wind_mps, sea_state=request.sea_state)
-    if not request.scale >= 1:
-        raise InputError(f"--scale is {request.scale:g}, expected ship length by model length, 1 or more")
     progress("reading the vessel", 0.0)
     ship, told = equipped(request.vessel, request.data)
     _check_place(ship, request.antenna_forward_m)
@@ -40,7 +37,9 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
         simulated_why_not=why_not,
         measured=seen,
         notes=(*told, *notes),
-        held=held,
+        depth_m=request.depth_m,
+        wind_mps=request.wind_mps,
+        sea_state=request.sea_state,
     )
     return finished(
         request,
