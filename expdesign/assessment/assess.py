@@ -8,6 +8,7 @@ from dataclasses import replace
 from expdesign.assessment.actuator_times import (
     delivered_anew,
     found_times,
+    known_times,
     with_held_noted,
     with_times,
     with_times_noted,
@@ -24,6 +25,7 @@ from expdesign.assessment.trials import (
     starts_of,
     tried,
 )
+from expdesign.assessment.unstated import answers, current
 from expdesign.assessment.values import (
     CONTINUOUS,
     HELD_OUT,
@@ -38,9 +40,9 @@ from expdesign.assessment.values import (
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind, tells_current
 from expdesign.estimation.excitation import EQUATION_WISE, check_excitation, worst_case
-from expdesign.estimation.methods import Method, method_named
-from expdesign.estimation.output_error import ActuatorTime
-from expdesign.estimation.regression import CURRENT
+from expdesign.estimation.methods import Method, method_for, method_named
+from expdesign.estimation.output_error import ActuatorTime, Begun
+from expdesign.estimation.regression import CURRENT, STEADY
 from expdesign.estimation.replay import Integration
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent
@@ -166,6 +168,43 @@ def assess(
         prior=options.prior,
         limits=limits_of(done[chosen], options.integration, progress=decomposing),
     )
+
+
+def with_unstated(
+    vessel: Vessel, raw: Record, options: EstimateOptions, found: Assessment, *, smoothed: bool = False
+) -> Assessment:
+    """An assessment with the current and the answers to inputs that nobody stated, as its output error shows them.
+
+    Args:
+        vessel: as in `assess`.
+        raw: with commands as inputs.
+        options: as in `assess`.
+        found: its result.
+        smoothed: as in `settled`.
+    """
+    own = next((item for item in (found.best, *found.methods) if item.method.solver == "oe"), None)
+    if own is None or options.motion != CONTINUOUS:
+        return found
+    method, held, flow = own.method, own.estimate, None
+
+    def again(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
+        work = Work(vessel=ship, stated=ship, record=record, options=replace(options, horizon_s=own.horizon_s))
+        begun = Begun(values=held.values, horizon_s=own.horizon_s)
+        return attempted(work, ship, work.seen(record), method, times=times, begun=begun)
+
+    try:
+        if not method.weather.steady:
+            method = method_for("oe", STEADY, wind=method.weather.wind) or method
+            free = again(vessel, found.record, known_times(vessel, vessel, found.record))
+            flow = current(held, free)
+            method, held = (own.method, held) if flow is None else (method, free)
+    except (InputError, NoAnswer):  # without headings, say
+        method = own.method
+    try:
+        late = answers(held, raw, vessel, again, smoothed=smoothed)
+    except (InputError, NoAnswer):
+        late = ()
+    return replace(found, current=flow, answers=late)
 
 
 def _kept(trials: Sequence[Trial], beside: Sequence[Trial], best: Sequence[int]) -> list[Trial]:

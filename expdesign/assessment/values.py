@@ -10,6 +10,7 @@ import scipy
 
 from expdesign.assessment.held_out import HeldOut, reason
 from expdesign.assessment.misfit import Limits, OneStep, RunCheck
+from expdesign.assessment.unstated import Answer, Current
 from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.estimation.disturbance import MeasuredWind, Moments
 from expdesign.estimation.excitation import ALL, SAMPLES, Breach
@@ -85,6 +86,8 @@ class Assessment:
     motion: str  # "continuous" or "euler", as in `EstimateOptions`
     prior: str  # "parameter_std" where estimates are joined with what the vessel file knew before, else "none"
     limits: tuple[Limits, ...]  # decomposed misfit of every run of the chosen estimate
+    current: Current | None = None  # that nobody stated
+    answers: tuple[Answer, ...] = ()  # inputs that the ship answers later or sooner than is stated
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from expdesign.estimation.regression.predictors import (
     CURRENT,
     NOTHING,
     PREDICTORS,
+    STEADY,
     UNKNOWN,
     Layout,
     Predictor,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign import requests
-from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind
+from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind, with_unstated
 from expdesign.errors import InputError
 from expdesign.estimation.methods import methods_for
 from expdesign.export.estimate_page import estimate_document
@@ -45,12 +45,13 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
         prior=request.prior,
     )
     with workers(0, load=None), doubted(raw):
-        now, record = settled(
-            ship, raw, options, smoothed=request.velocity == "smoothed", progress=within(progress, 0.01, 0.4)
-        )
+        smoothed = request.velocity == "smoothed"
+        now, record = settled(ship, raw, options, smoothed=smoothed, progress=within(progress, 0.01, 0.4))
         apart = reduced_data(request.tests, now, velocity=request.velocity) if request.tests else NO_TESTS
         begun = 0.01 if now is ship else 0.4
-        found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
+        found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.65))
+        progress("looking for what is not stated", 0.65)
+        found = with_unstated(now, raw, options, found, smoothed=smoothed)
     progress("drawing the report", 0.7)
     files: dict[str, Content] = {
         "estimate.json": estimate_json(found, ship),

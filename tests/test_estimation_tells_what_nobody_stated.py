@@ -1,0 +1,120 @@
+"""A current, a dead time and orders between rows pass into the parameters of who does not know of them, and are told.
+
+The ship is that of the bridge log. Her orders are given ten times a second, and read once a second.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.assessment import Assessment, EstimateOptions, assess, with_unstated
+from expdesign.export.estimate_page import answer_sentence, current_sentence
+from expdesign.reduction import reduced
+from expdesign.scenario import load_vessel
+from expdesign.signals import Batch, Commands, Record
+from expdesign.simulation import Environment, measure, simulate
+from expdesign.vessel import Vessel, with_response_values
+
+SHIP = load_vessel(Path(__file__).parents[1] / "scenarios" / "vessels" / "logged-50m.toml")
+FINE_S, ROW = 0.1, 10
+OPTIONS = EstimateOptions(methods=("oe",), mean="none")
+UNKNOWN = {
+    "a current and orders of the helm between rows": {"current_to": (-0.5, 0.0), "helm_later_s": 0.5},
+    "nothing": {},
+    "orders of the helm between rows": {"helm_later_s": 0.4},
+    "orders of the engine between rows": {"engine_later_s": 0.3},
+    "a dead time of the helm": {"rudder1_delay_s": 0.9},
+    "a current": {"current_to": (0.3, -0.4)},
+}
+
+
+def run(
+    seed: int,
+    *,
+    helm_later_s: float = 0.0,
+    engine_later_s: float = 0.0,
+    current_to: tuple[float, float] = (0.0, 0.0),
+    **times: float,
+) -> Record:
+    """Helm and engine to any level every 20 s, so much later than a row, with the noise of her sensors."""
+    rng, holds, held = np.random.default_rng(seed), 24, round(20 / FINE_S)
+    engine = np.repeat(rng.uniform(1.5, 3.5, holds), held)
+    helm = np.roll(np.repeat(rng.choice([-1.0, 1.0], holds) * rng.uniform(0.15, 0.5, holds), held), held // 2)
+    later = [round(time / FINE_S) for time in (engine_later_s, helm_later_s)]
+    values = np.stack([np.roll(engine, later[0]), np.roll(helm, later[1])], axis=1)
+    commands = Commands(sample_time_s=FINE_S, names=("n1", "rudder1"), values=values)
+    actuators = with_response_values(SHIP.actuators, times)
+    truth = replace(SHIP, model=replace(SHIP.model, actuators=actuators))
+    sea = Environment(current_to=np.array(current_to))
+    motion = simulate(truth, commands, velocity=(5.0 + current_to[0], current_to[1], 0.0), environment=sea)
+    seen = {name: column[::ROW] for name, column in measure(truth, commands, motion, environment=sea, rng=rng).items()}
+    batch = Batch(
+        name=f"run-{seed}", sample_time_s=FINE_S * ROW, input_names=commands.names, inputs=values[::ROW],
+        velocity=np.stack([seen["u_mps"], seen["v_mps"], seen["r_radps"]], axis=1),
+        pose=np.stack([seen["north_m"], seen["east_m"], np.unwrap(seen["heading_rad"])], axis=1),
+    )  # fmt: skip
+    return Record(batches=(batch,))
+
+
+def found(raw: Record, ship: Vessel = SHIP) -> Assessment:
+    """Output error, and what it shows beside."""
+    return with_unstated(ship, raw, OPTIONS, assess(ship, reduced(raw, ship), OPTIONS))
+
+
+def surprise(told: Assessment) -> float:
+    """The largest error of the estimate in its standard deviations."""
+    held, truth = told.best.estimate, dict(zip(SHIP.model.names, SHIP.model.parameters, strict=True))
+    return max(abs(held.value(name) - truth[name]) / std for name, std in zip(held.names, held.std, strict=True))
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[] if number == 0 else pytest.mark.thorough) for number, kind in enumerate(UNKNOWN)],
+)
+def test_what_nobody_stated_is_told_with_its_size(kind: str) -> None:
+    unknown = UNKNOWN[kind]
+    told = found(run(1, **unknown))
+    row_s = FINE_S * ROW
+    late = {}
+    for signal, given, delay in (
+        ("n1", "engine_later_s", "n1_delay_s"),
+        ("rudder1", "helm_later_s", "rudder1_delay_s"),
+    ):
+        # an order that was given after a row is shown by the next one
+        time_s = unknown[given] - row_s if given in unknown else unknown.get(delay, 0.0)
+        late |= {signal: time_s} if time_s else {}
+    named = {answer.signal for answer in told.answers}
+    assert named <= set(late)
+    if named < set(late):  # what is not told does no harm
+        assert surprise(told) < 4
+    for answer in told.answers:
+        assert abs(answer.late_s - late[answer.signal]) < 4 * answer.std_s
+        sentence = answer_sentence(answer)
+        assert ("sooner" in sentence) == (late[answer.signal] < 0)
+        assert f"{answer.moved.parameter} by {answer.moved.by_std:.0f} of its standard deviations" in sentence
+    if "current_to" not in unknown:
+        assert told.current is None
+        return
+    assert told.current is not None
+    north, east = unknown["current_to"]
+    assert np.hypot(told.current.north_mps - north, told.current.east_mps - east) < 5 * told.current.std_mps
+    toward = np.degrees(np.arctan2(told.current.east_mps, told.current.north_mps)) % 360
+    assert f"towards {toward:.0f} deg" in current_sentence(told.current)
+
+
+@pytest.mark.thorough
+def test_what_is_told_moves_the_estimate_from_the_truth() -> None:
+    """Without it parameters are wrong by far more than they say; what is stated as unknown is not told again."""
+    raw = run(1, helm_later_s=0.4)
+    assert surprise(found(raw)) > 5
+    stated = replace(SHIP, std={"rudder1_delay_s": 1.0})
+    assert not found(raw, stated).answers
+
+
+@pytest.mark.thorough
+def test_of_runs_without_anything_unknown_few_are_told_of() -> None:
+    """Each of two times and a current passes three standard deviations in 3 of 1000 runs: of 20, at most 2."""
+    told = [found(run(seed)) for seed in range(100, 120)]
+    assert sum(bool(one.answers) or one.current is not None for one in told) <= 2
