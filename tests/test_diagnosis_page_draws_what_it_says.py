@@ -44,6 +44,17 @@ def test_a_model_that_was_not_extended_is_not_called_so(clean):
         assert ("extended model" in page.partition("<h2>Method")[0]) is not there  # no second, equal column or line
 
 
+def test_errors_grow_over_the_times_that_the_axis_says(clean):
+    """Windows of slow samples are no shorter than twelve of these: no error is drawn at a shorter time than theirs."""
+    model, record = extended_model(clean.vessel, clean.record).model, clean.record
+    assert len(clean.before.horizons_s) > 2
+    for horizon_s in clean.before.horizons_s.tolist():
+        windows = cut_windows(model, record, longest_s=horizon_s)
+        assert windows.steps * windows.step_s == pytest.approx(horizon_s, rel=0.25)
+    rows = clean.before.growth
+    assert len(np.unique(rows, axis=0)) == len(rows)
+
+
 def test_slopes_of_straight_errors_are_exact_whatever_is_missing():
     error = 3.0 + 0.5 * 0.2 * np.arange(10)[None, :, None] * np.ones((2, 10, 3))
     error[0, [0, 4, 9], 1] = np.nan

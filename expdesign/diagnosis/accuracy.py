@@ -21,6 +21,7 @@ from expdesign.values import Array
 
 # times after a start at which the growth of the error is measured [s]
 HORIZONS_S = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
+ABOUT = 1.25  # factor by which windows may be longer than that
 # errors beyond so many standard deviations of the measurements count as that large; the simulation has diverged,
 # and the size of its error has no meaning
 LARGEST_ERROR = 10.0
@@ -167,8 +168,8 @@ def _growth(ship: ExtendedModel, record: Record, columns: list[int]) -> tuple[Ar
         if horizon < 4 * record.batches[0].sample_time_s or horizon > shortest:
             continue
         windows = cut_windows(ship.model, record, longest_s=horizon)
-        if windows.measured.shape[1] < 4:
-            continue
+        if windows.measured.shape[1] < 4 or windows.steps * windows.step_s > ABOUT * horizon:
+            continue  # windows have a least number of samples
         error = clipped(simulate_from_measured(ship, windows).error[..., columns], windows.measured[..., columns])
         last = error[:, -max(1, error.shape[1] // 5) :]
         rows.append(np.sqrt(np.nanmean(last**2, axis=(0, 1))))

@@ -424,6 +424,7 @@ EFFECTS: Mapping[str, Quantity] = {
 """Key or kind of an effect -> its row; the key comes first."""
 
 
+@cache
 def effect_row(key: str) -> Quantity:
     """The row of an effect."""
     return EFFECTS.get(key) or EFFECTS[key.partition(":")[0]]

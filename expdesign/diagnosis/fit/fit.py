@@ -20,7 +20,7 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
-from expdesign.diagnosis.model import LEAST_RESPONSE, ExtendedModel, resisting, term_factors
+from expdesign.diagnosis.model import LEAST_EFFECT, ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.values import Array
 from expdesign.vessel.quantities import TIME, acts_on, effect_row
@@ -177,7 +177,7 @@ def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 
     signs = resisting(ship.model)
     for place, key in enumerate(keys):
         if key.startswith(POSITIVE):
-            bounds[0, place] = LEAST_RESPONSE - now[place]
+            bounds[0, place] = LEAST_EFFECT - now[place]
         if key == "roll:period":
             bounds[0, place] = shortest_s - now[place]
         sign = signs.get(key.removeprefix("theta:"), 0.0)
@@ -250,7 +250,7 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
         if kind in ("lag", "delay", "slew", "deadband") or key in ("roll:period", "roll:damping"):
             before, ratio = ship.get(key), LARGEST_RATIO
             least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
-            value = min(max(value, least, LEAST_RESPONSE), max(before, 1e-3) * ratio)
+            value = min(max(value, least, LEAST_EFFECT), max(before, 1e-3) * ratio)
         elif effect_row(key).neutral == 1.0 and not acts_on(key, TIME):
             value = max(value, SMALLEST_FACTOR_CHANGE)
         result[key] = value

@@ -397,7 +397,7 @@ RESPONSES = {row.effects[0]: row.key for row in rows_of(Response)}
 
 The effect of a slew rate is its inverse, the time that a change of one unit takes, so that zero changes nothing.
 """
-LEAST_RESPONSE = 1e-6
+LEAST_EFFECT = 1e-6
 """Size of such an effect that is taken for zero: derivatives by times are differences upward."""
 
 

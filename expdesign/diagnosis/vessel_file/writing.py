@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from expdesign.diagnosis.model import (
-    LEAST_RESPONSE,
+    LEAST_EFFECT,
     RESPONSES,
     ExtendedModel,
     ahead_force_text,
@@ -370,7 +370,7 @@ def _actuators(actuators: tuple[Actuator, ...], ship: ExtendedModel) -> tuple[tu
 
 def _changed(response: Response, effects: Mapping[str, float]) -> Response:
     """A response with other effects; those that played no role in the data stay as they are stated."""
-    found = {kind: value if abs(value) > LEAST_RESPONSE else 0.0 for kind, value in effects.items()}
+    found = {kind: value if abs(value) > LEAST_EFFECT else 0.0 for kind, value in effects.items()}
     return replace(response, **{RESPONSES[kind]: response_effect(kind, value) for kind, value in found.items()})
 
 
