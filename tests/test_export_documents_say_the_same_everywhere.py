@@ -105,6 +105,14 @@ def test_findings_facts_verdict_and_notes_are_in_all_renderings(capsys: pytest.C
     assert json.loads(as_json("run", Outcome(files=(), document=WHOLE)))["summary"] == {**WHOLE.facts, "gap": None}
 
 
+@pytest.mark.parametrize("nothing", [[], (), {}, "", None, float("nan")])
+@pytest.mark.parametrize("key", ["steps_left_out", "left_out_s", "left_out_h"])
+def test_a_fact_of_nothing_is_said_and_not_left_blank(key: str, nothing: object) -> None:
+    ((label, text),) = fact_rows({key: nothing})
+    assert label in ("steps left out", "left out")
+    assert text in ("none", "-")
+
+
 def test_tables_are_on_page_and_terminal_unless_one_stands_for_the_other(capsys: pytest.CaptureFixture[str]) -> None:
     tables = [Table(header=("A",), rows=[(f"cell {on}",)], on=on) for on in ("all", "page", "terminal")]  # type: ignore[arg-type]
     page, terminal, _ = renderings(replace(WHOLE, sections=(section("Part", *tables),)), capsys)

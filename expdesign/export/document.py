@@ -29,6 +29,8 @@ UNITS = {
     "h": "h",
 }
 """Last part of the name of a fact -> printed unit."""
+UNKNOWN, NONE = "-", "none"
+"""Of facts without a value, and of lists of nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,23 +212,25 @@ def fact_rows(facts: Mapping[str, object], prefix: str = "") -> Iterator[tuple[s
         stem, _, suffix = key.rpartition("_")
         unit = UNITS.get(suffix, "") if stem else ""
         label = f"{prefix}{(stem if unit else key).replace('_', ' ')}"
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value:
             yield from fact_rows(value, f"{label}, ")
         elif unit == "h" and isinstance(value, float) and math.isfinite(value):
             yield label, hours(value * HOUR)
         else:
             text = fact_text(value)
-            yield label, text if text == "-" else f"{text} {unit}".rstrip()
+            yield label, text if text in (UNKNOWN, NONE) else f"{text} {unit}".rstrip()
 
 
 def fact_text(value: object) -> str:
-    """A value of a fact; "-" where there is none."""
+    """A value of a fact; "-" where it is not known, "none" of things of which there are none."""
     if value is None:
-        return "-"
+        return UNKNOWN
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float) and not math.isfinite(value):
-        return "-"
+        return UNKNOWN
+    if isinstance(value, (str, Mapping, list, tuple)) and not value:
+        return NONE
     if isinstance(value, float):
         return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.5g}"
     if isinstance(value, Mapping):
