@@ -12,27 +12,13 @@ from pydantic import Field
 
 from expdesign.roll import MEANINGS, PARAMETERS, UNITS, Body, Load
 from expdesign.scenario.tables import Entry, Number, Positive, Table, check_table, read_toml
-from expdesign.scenario.vessels.pendulum_table import LoadTable
+from expdesign.scenario.vessels.pendulum_table import BodyTable, LoadTable
 from expdesign.vessel import Vessel
 
 
-class ShipTable(Table):
+class ShipTable(BodyTable):
     """`[ship]`."""
 
-    mass_kg: Positive = Field(description="the mass of the ship without load [kg]")
-    mass_height_m: Number = Field(description="the height of her centre of mass above the origin [m]")
-    sensor_height_m: Number = Field(
-        description="the height of the accelerometer [m] above the origin, or above the rotation axis"
-    )
-    sensor_above_axis: bool = Field(
-        default=False, description="whether sensor_height_m is counted from the rotation axis, which has been located"
-    )
-    sensor_forward_m: Number = Field(
-        default=0.0, description="the place of the sensor before midships, about which she turns [m]"
-    )
-    sensor_tilt_deg: Number | None = Field(
-        default=None, description="the tilt of the sensor, its bow end up, where it was measured [deg]"
-    )
     beam_m: Positive = Field(description="her beam [m], from which a search begins")
     period_s: Positive = Field(description="her roll period [s], roughly; a filter must pass it")
 
@@ -95,7 +81,7 @@ def load_cases(path: Path | str, vessel: Vessel | None = None) -> LoadCases:
         if file.ship is None:
             raise entry.at("ship").error("is missing, expected this table, or --vessel with a file that has [roll]")
         return LoadCases(
-            body=_body(file.ship), loads=loads, beam_m=file.ship.beam_m, period_s=file.ship.period_s, known=known,
+            body=file.ship.body, loads=loads, beam_m=file.ship.beam_m, period_s=file.ship.period_s, known=known,
             start=start,
         )  # fmt: skip
     if file.ship is not None:
@@ -106,14 +92,6 @@ def load_cases(path: Path | str, vessel: Vessel | None = None) -> LoadCases:
     return LoadCases(
         body=vessel.pendulum.body, loads=loads, beam_m=vessel.beam_m, period_s=vessel.pendulum.period_s, known=known,
         start={**begin, **start},
-    )  # fmt: skip
-
-
-def _body(ship: ShipTable) -> Body:
-    return Body(
-        mass_kg=ship.mass_kg, z_g=-ship.mass_height_m, z_s=-ship.sensor_height_m,
-        sensor_from_axis=ship.sensor_above_axis, forward_m=ship.sensor_forward_m,
-        tilt_rad=None if ship.sensor_tilt_deg is None else math.radians(ship.sensor_tilt_deg),
     )  # fmt: skip
 
 

@@ -71,16 +71,13 @@ class WavesTable(Table):
     slope_share: Positive = Field(default=1.0, description="the share of their slope that acts on the hull, at most 1")
 
 
-class PendulumTable(Table):
-    """`[roll]`: a pendulum that the motion drives, and that does not act back on it."""
+class BodyTable(Table):
+    """What is known of the masses of a ship without load, and of where her accelerometer is."""
 
     mass_kg: Positive = Field(description="the mass of the ship without load [kg]")
     mass_height_m: Number = Field(description="the height of her centre of mass above the origin [m]")
     sensor_height_m: Number = Field(
         description="the height of the accelerometer [m] above the origin, or above the rotation axis"
-    )
-    heel_max_deg: Positive | None = Field(
-        default=None, description="the largest roll angle of a plan, in still water [deg]; none when not given"
     )
     sensor_above_axis: bool = Field(
         default=False, description="whether sensor_height_m is counted from the rotation axis, which has been located"
@@ -90,6 +87,23 @@ class PendulumTable(Table):
     )
     sensor_tilt_deg: Number | None = Field(
         default=None, description="the tilt of the sensor, its bow end up, where it was measured [deg]"
+    )
+
+    @property
+    def body(self) -> Body:
+        """As a value, downward from the origin."""
+        return Body(
+            mass_kg=self.mass_kg, z_g=-self.mass_height_m, z_s=-self.sensor_height_m,
+            sensor_from_axis=self.sensor_above_axis, forward_m=self.sensor_forward_m,
+            tilt_rad=None if self.sensor_tilt_deg is None else math.radians(self.sensor_tilt_deg),
+        )  # fmt: skip
+
+
+class PendulumTable(BodyTable):
+    """`[roll]`: a pendulum that the motion drives, and that does not act back on it."""
+
+    heel_max_deg: Positive | None = Field(
+        default=None, description="the largest roll angle of a plan, in still water [deg]; none when not given"
     )
     metacentric_height_m: Positive | None = Field(
         default=None, description="the metacentric height of the ship without load [m], in place of parameters.k"
@@ -130,14 +144,9 @@ def build_pendulum(table: PendulumTable, entry: Entry) -> RollPendulum:
         if (name in table.parameters) == (getattr(table, key) is not None):
             both = "both are given" if name in table.parameters else "neither is given"
             raise entry.error(f"{key} and parameters.{name}: {both}, expected one of them")
-    body = Body(
-        mass_kg=table.mass_kg, z_g=-table.mass_height_m, z_s=-table.sensor_height_m,
-        sensor_from_axis=table.sensor_above_axis, forward_m=table.sensor_forward_m,
-        tilt_rad=None if table.sensor_tilt_deg is None else math.radians(table.sensor_tilt_deg),
-    )  # fmt: skip
     try:
         return RollPendulum(
-            body=body, load=table.load.load, parameters=_parameters(table, body),
+            body=table.body, load=table.load.load, parameters=_parameters(table, table.body),
             parameter_std=dict(table.parameter_std),
             parameter_correlation=checked_correlation(
                 table.parameter_correlation, ROLL_PARAMETERS, entry.at("parameter_correlation")
