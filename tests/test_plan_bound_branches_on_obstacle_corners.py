@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.bounds.branch_and_bound import GoalTimes, goal_times, grown_times, time_saved_s
+from expdesign.plan.bounds.branch_and_bound import (
+    CELL_HEADINGS,
+    GoalTimes,
+    first_cells,
+    goal_times,
+    grown_times,
+    next_cells,
+    spread_m,
+    time_saved_s,
+)
 from expdesign.plan.bounds.displacement import Headway, displacement_of, track_of
 from expdesign.plan.chart.visibility_graph import build_visibility_graph
 from expdesign.simulation import Environment
@@ -42,6 +51,27 @@ def displacements(runs, headway):
 def saved_by(runs, water, ends, headway=STILL):
     counts = {run.name: 1 for run in runs}
     return time_saved_s(runs, displacements(runs, headway), counts, water, ends, headway, ship())
+
+
+def test_cells_of_every_level_cover_all_places_and_headings_and_ends_stay_within_their_spread() -> None:
+    rng = np.random.default_rng(5)
+    cell_m, reach_m, points = 7.0, 40.0, rng.uniform([-20, -15, 0], [20, 15, 2 * np.pi], (60, 3))
+    cells = first_cells(shapely.box(-15, -20, 15, 20), 0.0, cell_m)
+    for level in range(4):
+        apart = points[:, None] - cells
+        apart[..., 2] = (apart[..., 2] + np.pi) % (2 * np.pi) - np.pi
+        edges = np.array([cell_m / 2, cell_m / 2, np.pi / CELL_HEADINGS]) * 0.5**level
+        inside = (np.abs(apart) <= edges + 1e-9).all(axis=2)
+        assert (inside.sum(axis=1) == 1).all()
+        own = cells[inside.argmax(axis=1)]
+        far = own[:, :2] - points[:, :2] + reach_m * (unit(own[:, 2]) - unit(points[:, 2]))
+        assert (np.hypot(*far.T) <= spread_m(cell_m, reach_m, level)).all()
+        assert np.hypot(*far.T).max() > spread_m(cell_m, reach_m, level) / 3  # which is no empty promise
+        cells = next_cells(np.unique(own, axis=0), cell_m, level)
+
+
+def unit(heading_rad: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=-1)
 
 
 def test_times_to_the_goal_are_those_of_the_fastest_paths():

@@ -108,7 +108,7 @@ class Saving:
             left = saved + slack_s > threshold_s
             if level == LEVELS + EXTRA_LEVELS:
                 return float((saved[left] + slack_s).max(initial=threshold_s)), lookups
-            cells = _halved(cells[left], self.cell_m * 0.5**level, np.pi / CELL_HEADINGS * 0.5**level)
+            cells = next_cells(cells[left], self.cell_m, level)
         raise AssertionError("the last level returns")
 
     @property
@@ -226,10 +226,11 @@ def first_cells(water: shapely.Geometry, more_m: float, cell_m: float) -> Array:
     return np.stack([grid.ravel() for grid in grids], axis=1)
 
 
-def _halved(cells: Array, cell_m: float, half_rad: float) -> Array:
-    """(8 n, 3) middles of the eighths of cells with an edge and half a range of headings."""
+def next_cells(cells: Array, cell_m: float, level: int) -> Array:
+    """(8 n, 3) middles of the eighths of cells (n, 3) of a level, the first of which have an edge."""
     signs = np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    return np.asarray((cells[:, None] + signs * [cell_m / 2, cell_m / 2, half_rad]).reshape(-1, 3))
+    halves = np.array([cell_m / 2, cell_m / 2, np.pi / CELL_HEADINGS]) * 0.5**level
+    return np.asarray((cells[:, None] + signs * halves).reshape(-1, 3))
 
 
 def _near_corners(track: Track, cells: Array, corners: Array, farther_m: float) -> Array:
