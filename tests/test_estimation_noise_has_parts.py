@@ -20,7 +20,7 @@ from expdesign.estimation.noise.covariance import SPECTRUM_MISFIT, score_covaria
 from expdesign.estimation.regression import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start
-from expdesign.estimation.solve.sandwich import widening
+from expdesign.estimation.solve.sandwich import WHITE_TEST_LEVEL, changing_variance, widening
 from expdesign.estimation.solve.solution import Weighting, solve_iv
 from expdesign.simulation import Variation
 from expdesign.simulation.environment import vary
@@ -234,3 +234,16 @@ def test_equations_with_instruments_leave_out_the_sample_that_instruments_start_
     assert len(one.regression) == len(batch) - 2
     assert (one.regression.step_of > 0).all()
     assert not np.array_equal(estimate(record(batch), NOMINAL).values, estimate(record(other), NOMINAL).values)
+
+
+def test_noise_of_one_variance_is_called_changing_as_rarely_as_the_level_of_white_s_test_says() -> None:
+    rng, draws, samples = np.random.default_rng(77), 1000, 2000
+    batch, step = np.zeros(samples, dtype=np.int64), np.arange(samples)
+    factors = np.concatenate(
+        [
+            changing_variance(rng.standard_normal((samples, 1, 1)), rng.standard_normal((samples, 1)), batch, step)
+            for _ in range(draws)
+        ]
+    )
+    seldom = draws * WHITE_TEST_LEVEL  # squares of squares are skewed, so that it is somewhat more
+    assert 0.2 * seldom <= (factors > 1.0).sum() <= 3.0 * seldom

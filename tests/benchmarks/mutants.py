@@ -38,7 +38,9 @@ FILES = {
         "plan_verification_catches_what_is_wrong", "plan_heel_is_checked",
         "plan_information_is_split_by_where_it_comes_from", "plan_whole_days_are_as_accurate_as_stated",
     ),
-    "estimation/solve/sandwich": ("estimation_agrees_with_econometrics", "estimation_noise_has_parts"),
+    "estimation/solve/sandwich": (
+        "estimation_agrees_with_econometrics", "estimation_noise_has_parts", "estimation_equation_wise_samples",
+    ),
     "reduction/sensors": ("reduction_undoes_what_the_vessel_file_states",),
     "simulation/actuation": (
         "simulation_actuators_deliver_by_closed_forms", "reduction_undoes_what_the_vessel_file_states",
