@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import shapely
 
 from expdesign.plan.values import Leg, SailedTrial
-from expdesign.plan.verify import hull_clearance, verify_plan
+from expdesign.plan.verify import _limit_excess, hull_clearance, verify_plan
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, simulate
+from expdesign.vessel import Limit
 from plan_case import area, primitive, ship
 
 CLEARANCE_M = 20.0
@@ -194,3 +196,18 @@ def test_legs_go_no_faster_through_water_than_stated_whatever_the_current(curren
 def test_runs_and_legs_from_faster_runs_may_be_faster_than_stated():
     plan = sound()
     assert check({**plan, "transit_mps": 0.5}).passed
+
+
+@pytest.mark.parametrize(("low", "high", "span"), [(0.0, 5.0, 5.0), (-2.0, 3.0, 5.0), (-np.inf, np.inf, 2 * np.pi)])
+def test_what_passes_a_limit_or_rate_counts_as_a_share_of_the_range(low: float, high: float, span: float) -> None:
+    vessel = SimpleNamespace(limits=(Limit(low=low, high=high),), rates=np.array([0.7]))
+
+    def excess(*values: float) -> tuple[float, str]:
+        commands = Commands(sample_time_s=2.0, names=("n1",), values=np.array(values)[:, None])
+        return _limit_excess(vessel, commands, np.array([1.0]))  # type: ignore[arg-type]
+
+    assert excess(1.0, 2.3, 1.0) == (0.0, "")
+    assert excess(1.0, 2.6, 1.3) == (pytest.approx(0.2 / span), "n1 passes its rate")
+    if np.isfinite(high):
+        for beyond in (high + 0.5, low - 0.5):
+            assert excess(*np.linspace(1.0, beyond, 9)) == (pytest.approx(0.5 / span), "n1 passes its limit")
