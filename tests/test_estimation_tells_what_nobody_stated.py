@@ -114,6 +114,26 @@ def test_what_is_told_moves_the_estimate_from_the_truth() -> None:
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("solver", ["oe", "iv"])
+@pytest.mark.parametrize("current_to", [(0.3, -0.4), (-0.6, 0.1)])
+def test_a_method_that_knows_the_current_predicts_with_it_and_is_taken(
+    solver: str, current_to: tuple[float, float]
+) -> None:
+    """In the frame of the water; over ground its true parameters predict worse than wrong ones."""
+    raw = Record(batches=tuple(run(seed, current_to=current_to).batches[0] for seed in (1, 2)))
+    options = replace(OPTIONS, methods=(solver, f"{solver}-current"))
+    told = assess(SHIP, reduced(raw, SHIP), options)
+    least = {item.method.name: item.share for item in sorted(told.compared, key=lambda item: -item.share)}
+    assert least[f"{solver}-current"] < least[solver] / 2
+    assert told.best.method.name == f"{solver}-current"
+    assert surprise(told) < 4.5
+    still = Record(batches=tuple(run(seed).batches[0] for seed in (1, 2)))
+    compared = assess(SHIP, reduced(still, SHIP), options).compared
+    least = {item.method.name: item.share for item in sorted(compared, key=lambda item: -item.share)}
+    assert least[f"{solver}-current"] == pytest.approx(least[solver], rel=0.05)
+
+
+@pytest.mark.thorough
 def test_of_runs_without_anything_unknown_few_are_told_of() -> None:
     """Each of two times and a current passes three standard deviations in 3 of 1000 runs: of 20, at most 2."""
     told = [found(run(seed)) for seed in range(100, 120)]

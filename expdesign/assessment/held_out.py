@@ -189,8 +189,18 @@ def _cut(batch: Batch, most: int) -> list[Batch]:
     return [batch.cut(slice(first, end)) for first, end in itertools.pairwise(ends)]
 
 
-Refit = Callable[[Record], VesselModel]
-"""The model by the same method from other data; raises `NoAnswer` or `InputError` where there is none."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """What one estimate predicts with."""
+
+    model: VesselModel
+    # (2,) velocity of the water to north, east [m/s], where the method takes it for steady, else None: velocities over
+    # ground are then predicted from those through water
+    current: Array | None = None
+
+
+Refit = Callable[[Record], Found]
+"""The same method from other data; raises `NoAnswer` or `InputError` where there is no estimate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,7 +210,7 @@ class Candidate:
     # method, horizon_s: as of `HeldOut`
     method: Method
     horizon_s: float | None
-    model: VesselModel  # with the estimate
+    found: Found  # the estimate
     wind: bool  # whether measured wind acts
     again: Refit  # the same from other data
 
@@ -225,7 +235,7 @@ def held_out(
         integration: how models are simulated.
     """
     apart: list[Batch] = []
-    models: list[list[VesselModel | None]] = []
+    models: list[list[Found | None]] = []
     for rest, left_out in folds(record):
         row = [_model(candidate, rest) for candidate in candidates]
         if any(model is not None for model in row):
@@ -235,19 +245,29 @@ def held_out(
     unseen = bool(apart)
     if not unseen:
         apart = list(seen_as(record).batches)
-        models = [[candidate.model for candidate in candidates]] * len(apart)
-    bounded = stay_bounded([candidate.model for candidate in candidates], ship, seen_as(record).batches, integration)
-    ahead = {
-        wind: Ahead(candidates[0].model, apart, wind=wind, integration=integration)
-        for wind in {candidate.wind for candidate in candidates}
-    }
-    each = [ahead[item.wind].shares([row[number] for row in models]) for number, item in enumerate(candidates)]
+        models = [[candidate.found for candidate in candidates]] * len(apart)
+    structures = [candidate.found.model for candidate in candidates]
+    bounded = stay_bounded(structures, ship, seen_as(record).batches, integration)
+    still: dict[bool, Ahead] = {}
+
+    def shares_of(number: int, item: Candidate) -> Array:
+        found = [row[number] for row in models]
+        if item.method.weather.steady:
+            moved = [_through_water(batch, own) for batch, own in zip(apart, found, strict=True)]
+            ahead = Ahead(structures[0], moved, wind=item.wind, integration=integration, spread=apart)
+        else:
+            if item.wind not in still:
+                still[item.wind] = Ahead(structures[0], apart, wind=item.wind, integration=integration)
+            ahead = still[item.wind]
+        return ahead.shares([None if own is None else own.model for own in found])
+
+    each = [shares_of(number, item) for number, item in enumerate(candidates)]
     names = [batch.name for batch in apart]
     return tuple(
         HeldOut(
             method=candidate.method,
             horizon_s=candidate.horizon_s,
-            outputs=candidate.model.outputs,
+            outputs=candidate.found.model.outputs,
             shares=typical(shares),
             unseen=unseen,
             bounded=own,
@@ -264,7 +284,17 @@ def by_run(shares: Array, names: Sequence[str]) -> Array:
     return np.array([own[np.isfinite(own)].mean() if np.isfinite(own).any() else np.nan for own in rows])
 
 
-def _model(candidate: Candidate, rest: Record) -> VesselModel | None:
+def _through_water(batch: Batch, found: Found | None) -> Batch:
+    """The run in the frame of the water, in which a ship moves as she does in still water."""
+    if found is None or found.current is None or batch.pose is None:
+        return batch
+    (north, east), c, s = found.current, np.cos(batch.pose[:, 2]), np.sin(batch.pose[:, 2])
+    velocity = np.array(batch.velocity)
+    velocity[:, :2] -= np.stack([c * north + s * east, c * east - s * north], axis=1)
+    return replace(batch, velocity=velocity)
+
+
+def _model(candidate: Candidate, rest: Record) -> Found | None:
     try:
         return candidate.again(rest)
     except (NoAnswer, InputError):
@@ -337,9 +367,18 @@ class Ahead:
         batches: the runs, as they are to be predicted.
         wind: whether measured wind acts.
         integration: how models are simulated.
+        spread: the runs over whose standard deviations errors are, where others than these.
     """
 
-    def __init__(self, model: VesselModel, batches: Sequence[Batch], *, wind: bool, integration: Integration) -> None:
+    def __init__(
+        self,
+        model: VesselModel,
+        batches: Sequence[Batch],
+        *,
+        wind: bool,
+        integration: Integration,
+        spread: Sequence[Batch] | None = None,
+    ) -> None:
         """Cut the windows and compile them."""
         driven = model_for(model, Record(batches=tuple(batches)))
         self._places = tuple(OUTPUTS.index(name) for name in driven.outputs)
@@ -360,7 +399,8 @@ class Ahead:
         counts = np.array([len(rows) for rows in measured])
         self._measured, drive = _stacked(measured, counts.max(), np.nan), _stacked(drives, counts.max(), None)
         self.owners: Integers = np.array(owners)
-        self._spread = np.stack([self._of_run(batch, batches) for batch in batches])
+        spread = batches if spread is None else spread
+        self._spread = np.stack([self._of_run(batch, spread) for batch in spread])
         self._compiled: Compiled = compiled(
             Stretches(
                 model=driven,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from expdesign.assessment.actuator_times import considered, known_times
-from expdesign.assessment.held_out import Candidate, HeldOut, held_out
+from expdesign.assessment.held_out import Candidate, Found, HeldOut, held_out
 from expdesign.assessment.misfit import AHEAD_S
 from expdesign.assessment.values import (
     AUTO,
@@ -19,6 +19,7 @@ from expdesign.assessment.values import (
     with_prior,
 )
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative
+from expdesign.estimation.disturbance import steady_current
 from expdesign.estimation.excitation import worst_case
 from expdesign.estimation.instrumental import STARTS, Settings
 from expdesign.estimation.methods import Method, estimate, method_named
@@ -28,7 +29,7 @@ from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.reduction import averaged, samples_of_a_mean
 from expdesign.signals import Record
-from expdesign.vessel import Vessel, VesselModel
+from expdesign.vessel import Vessel
 
 WORTH_WHOLE = 1.5  # runs so many horizons long are compared with simulations of their whole length too
 
@@ -147,18 +148,21 @@ def predictions_of(work: Work, trials: Sequence[Trial]) -> tuple[HeldOut, ...]:
         ship = replace(work.vessel, model=structure.with_parameters(trial.found.assignments))
         own = replace(work, options=replace(work.options, horizon_s=trial.horizon_s, start=AUTO))
 
-        def again(rest: Record) -> VesselModel:
+        def predicting(found: Estimate) -> Found:
+            return Found(model=structure.with_parameters(found.assignments), current=steady_current(found))
+
+        def again(rest: Record) -> Found:
             if trial.method.solver == "oe":
                 found = attempted(own, ship, own.seen(rest), trial.method, begun=_begun(trial), quick=True)
             else:
                 found, _ = _started(own, ship, rest, trial.method, quick=True)
             found = with_prior(found, structure) if own.options.prior == PARAMETER_STD else found
-            return structure.with_parameters(found.assignments)
+            return predicting(found)
 
         return Candidate(
             method=trial.method,
             horizon_s=trial.horizon_s,
-            model=ship.model,
+            found=predicting(trial.found),
             wind=trial.method.weather.wind,
             again=again,
         )

@@ -86,6 +86,12 @@ def tells_current(estimate: Estimate) -> bool:
     return set(STEADY_CURRENT) <= names or any(_needs(reading) <= names for reading in READINGS)
 
 
+def steady_current(estimate: Estimate) -> Array | None:
+    """(2,) the current to north, east [m/s] that an estimate takes for steady; None where it knows of none."""
+    values = dict(zip(estimate.nuisance_names, estimate.nuisance_values.tolist(), strict=True))
+    return np.array([values[name] for name in STEADY_CURRENT]) if set(STEADY_CURRENT) <= set(values) else None
+
+
 def current_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> Moments:
     """Mean and second moments of the current.
 
