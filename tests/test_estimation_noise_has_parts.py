@@ -73,7 +73,7 @@ def test_score_covariance_is_that_of_the_matrix_with_batches_and_outputs() -> No
     moments = np.array([[1e3, cross], [cross, 1e3]])
     basis = np.linalg.qr(rng.normal(size=(80, 2)))[0] * np.sqrt(80)
     residuals = basis @ np.linalg.cholesky(moments).T
-    blocks = score_covariance(W, residuals, fitted, parts).blocks
+    blocks, _ = score_covariance(W, residuals, fitted, parts)
     for o in range(2):
         for other in range(2):
             shared = 1.0 if o == other else 0.3
@@ -116,7 +116,7 @@ def test_slow_noise_from_one_side_of_the_chart_is_known_while_the_ship_turns() -
         north, east = vary(slow, rng.normal(size=(k, 2)), sample_time_s=1.0).T
         noise = (np.cos(heading) * north + np.sin(heading) * east + rng.normal(size=k))[:, None]
         fits = [(part, fit_components(noise, [part])) for part in (aware, blind)]
-        stated.append([score_covariance([W], noise, fit, [part]).blocks[0][0][0, 0] / exact for part, fit in fits])
+        stated.append([score_covariance([W], noise, fit, [part])[0][0][0][0, 0] / exact for part, fit in fits])
     (with_heading, without), chance = np.mean(stated, axis=0), np.std(stated, axis=0) / np.sqrt(len(stated))
     assert abs(with_heading - 1) < 1 / 3 + 2 * chance[0]
     assert without < 0.6 + 2 * chance[1]
@@ -129,8 +129,8 @@ def test_variances_known_from_few_batches_widen_intervals_as_students_t() -> Non
     level = 10.0 * np.repeat(rng.normal(size=n), length) + 0.01 * rng.normal(size=n * length)
     (fitted,) = fit_components(level[:, None], parts)
     W = np.ones((n * length, 1))
-    scores = score_covariance([W], level[:, None], [fitted], parts)
-    factor = widening(np.diag(scores.blocks[0][0]), scores.doubts[0])
+    blocks, doubts = score_covariance([W], level[:, None], [fitted], parts)
+    factor = widening(np.diag(blocks[0][0]), doubts[0])
     np.testing.assert_allclose(factor, scipy.stats.t.ppf(0.975, n) / scipy.stats.norm.ppf(0.975), rtol=0.01)
 
 

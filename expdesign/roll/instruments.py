@@ -55,12 +55,8 @@ BlackBox = tuple[Array, Array]
 """Numerator and denominator in powers of the delay."""
 
 
-@dataclass(frozen=True, eq=False)
-class Fold:
-    """A part of a run and the instruments there."""
-
-    part: slice  # samples of the run
-    columns: Array  # (k, q) instruments of the whole run, by black boxes that were not fitted to this part
+Fold = tuple[slice, Array]
+"""Samples of a part of a run, and (k, q) instruments of the whole run by black boxes not fitted to that part."""
 
 
 def folds(runs: Sequence[Run]) -> list[list[Fold]]:
@@ -70,7 +66,7 @@ def folds(runs: Sequence[Run]) -> list[list[Fold]]:
     sought = 3 if all(run.planned is None for run in runs) else 4
     boxes = [_boxes(sources, [run.signals[:, place] for run in runs], parts) for place in range(sought)]
     return [
-        [Fold(part, instrument_columns(_simulated(source, [box[number] for box in boxes]))) for number, part in own]
+        [(part, instrument_columns(_simulated(source, [box[number] for box in boxes]))) for number, part in own]
         for source, own in zip(sources, parts, strict=True)
     ]
 
@@ -128,9 +124,7 @@ def instrument_columns(simulated: Array) -> Array:
 def stitched(own: Sequence[Fold], columns: Sequence[Array], noise: NoiseModel) -> Array:
     """(n, q) rows of each fold's part of a run from its own columns (n, q)."""
     first = LEFT_OUT_SAMPLES
-    parts = [
-        rows[max(fold.part.start - first, 0) : fold.part.stop - first] for fold, rows in zip(own, columns, strict=True)
-    ]
+    parts = [rows[max(part.start - first, 0) : part.stop - first] for (part, _), rows in zip(own, columns, strict=True)]
     return without_start(np.concatenate(parts), noise)
 
 
@@ -174,7 +168,7 @@ def weighted_equations(
     else:
         # through 1 / spectrum are the weights of least variance; the equation is whitened too, as instruments that end
         # suddenly would pick up the noise of high frequencies, which is many times stronger
-        white = [[model.whitened(fold.columns)[LEFT_OUT_SAMPLES:] for fold in own] for own in instruments]
+        white = [[model.whitened(columns)[LEFT_OUT_SAMPLES:] for _, columns in own] for own in instruments]
         pairs = list(zip(instruments, white, strict=True))
         basis = _basis([stitched(own, [left.divided(part) for part in one], model) for own, one in pairs], left)
         hidden = _hidden(rows, [stitched(own, one, model) for own, one in pairs]) if follows else ()

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -18,20 +17,14 @@ OPERATIONS = ("add", "subtract", "multiply", "negative", "absolute", "sin", "cos
 BINARY = (0, 1, 2)
 
 
-@dataclass(frozen=True)
-class Kernels:
-    """Compiled functions."""
-
-    # (codes, memory) -> a function that does all operations on the rows of memory once
-    execute: Callable[[Any, Any], Callable[[], None]]
-    # (generator, spread (8,), sea (k, 4, n), noise (k, 8, n)) fills the sea with standard normal numbers and the noise
-    # with spread times such, sample by sample, in NumPy's order
-    normal: Callable[[Any, Any, Any, Any], None]
-
-
 @cache
-def kernels() -> Kernels:
+def kernels() -> tuple[Callable[[Any, Any], Callable[[], None]], Callable[[Any, Any, Any, Any], None]]:
     """Compile, once.
+
+    Returns:
+        (codes, memory) -> a function that does all operations on the rows of memory once; and one of (generator,
+        spread (8,), sea (k, 4, n), noise (k, 8, n)) that fills the sea with standard normal numbers and the noise with
+        spread times such, sample by sample, in NumPy's order.
 
     Raises:
         InputError: numba is not installed.
@@ -41,7 +34,7 @@ def kernels() -> Kernels:
     except ImportError:
         raise InputError("engine 'numba' needs numba, which is not installed: pip install 'expdesign[fast]'") from None
     execute, normal = njit(nogil=True)(_execute), njit(nogil=True)(_normal)
-    return Kernels(execute=lambda codes, memory: lambda: execute(codes, memory), normal=normal)
+    return lambda codes, memory: lambda: execute(codes, memory), normal
 
 
 def _execute(codes: Any, memory: Any) -> None:

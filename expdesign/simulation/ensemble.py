@@ -220,7 +220,7 @@ def _drawn(rng: np.random.Generator, spread: Array, noise: Array, engine: str, p
     count, rows, runs = part_noise.shape
     if engine == "numba":
         sea = np.empty((count, 4, runs))
-        kernels().normal(rng, spread, sea, part_noise)
+        kernels()[1](rng, spread, sea, part_noise)
         return sea
     drawn = rng.standard_normal((count, 4 + rows, runs))
     np.multiply(drawn[:, 4:], spread[:, None], out=part_noise)

@@ -368,7 +368,7 @@ def prepared(codes: Array, memory: Array, constants: Mapping[int, float], engine
         InputError: numba is not installed.
     """
     if engine == "numba":
-        return kernels().execute(codes, memory)
+        return kernels()[0](codes, memory)
     if engine != "numpy":
         raise UnknownName("engine", engine, known=("numpy", "numba"))
     rows = [np.asarray(constants[row]) if row in constants else memory[row] for row in range(len(memory))]

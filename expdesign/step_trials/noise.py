@@ -35,21 +35,17 @@ STEADY_SHARE = 1 / 3  # end of a hold in which the vessel counts as steady here
 SMALL = 0.1  # of the mean speed: standard error of a current up to which it is counted though none was seen
 
 
-@dataclass(frozen=True, kw_only=True)
-class MeanError:
-    """Of one plateau and state."""
+def mean_errors(parts: Sequence[Array]) -> tuple[tuple[float, float], ...]:
+    """Of each stretch (k,) of one state, all with one sample time; infinite where a stretch is too short to tell.
 
-    std: float  # of the mean
-    density: float  # variance of the mean of many samples, times their number
-
-
-def mean_errors(parts: Sequence[Array]) -> tuple[MeanError, ...]:
-    """Of each stretch (k,) of one state, all with one sample time; infinite where a stretch is too short to tell."""
+    Returns:
+        Standard error of the mean, and the variance of the mean of many samples, times their number.
+    """
     per = max(1, round(float(np.median([len(part) for part in parts])) / BLOCKS))
     means = [_apart(part, per) for part in parts]
     long = [one for one in means if len(one) > ORDER + 1]
     if not long:
-        return tuple(MeanError(std=math.inf, density=math.inf) for _ in parts)
+        return ((math.inf, math.inf),) * len(parts)
     shape = _autocorrelation(long)
     hidden = [_hidden(shape, len(one)) for one in means]
     own = [float(one @ one) / max(len(one) * (1.0 - gone), 1e-9) for one, gone in zip(means, hidden, strict=True)]
@@ -61,7 +57,7 @@ def mean_errors(parts: Sequence[Array]) -> tuple[MeanError, ...]:
         independent = 1.0 / gone - 1.0
         variance = (SHARED * common + independent * size) / (SHARED + independent)
         std = wider * math.sqrt(variance * gone) if len(one) > 1 else math.inf
-        found.append(MeanError(std=std, density=variance * per * float(shape[0] + 2.0 * shape[1:].sum())))
+        found.append((std, variance * per * float(shape[0] + 2.0 * shape[1:].sum())))
     return tuple(found)
 
 

@@ -55,18 +55,10 @@ class Plateau:
     # (2,) mean cosine and sine of the heading, near zero over whole turns
     course: Array = field(default_factory=lambda: np.zeros(2))
     samples: int = 0  # of the mean
-    density: Array = field(default_factory=lambda: np.zeros(2))  # of the noise: see `MeanError`
+    density: Array = field(default_factory=lambda: np.zeros(2))  # of the noise: see `mean_errors`
 
     def __post_init__(self) -> None:
         seal(self, state="2", std="2", inputs="m", course="2", density="2")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Middle:
-    """State at half of a transient."""
-
-    state: Array  # (2,) U and r
-    sway: float  # v, nan where it is not known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +72,7 @@ class StepSample:
     transient: Transient | None = None  # data of the state that the command drives
     response: Response | None = None  # of the state that the command drives: second order where that is preferred
     first_order: Response | None = None  # the same by a first order, for comparison
-    middle: Middle | None = None  # of the transient
+    middle: tuple[Array, float] | None = None  # (2,) U and r at half of the transient; v, nan where it is not known
     # inertia, inertia_std: m in units of command per acceleration
     inertia: float = math.nan
     inertia_std: float = math.nan
@@ -151,7 +143,7 @@ def _with_common_noise(
         found[place] = replace(
             part,
             std=np.array([math.hypot(part.std[0], math.sqrt(drift)), part.std[1]]),
-            sway_std=part.sway_std if v is None else math.hypot(v.std, math.sqrt(aside)),
+            sway_std=part.sway_std if v is None else math.hypot(v[0], math.sqrt(aside)),
         )
     return found
 
@@ -165,7 +157,7 @@ def with_errors(parts: Sequence[Plateau], states: Sequence[Array], *, beside: Se
     """
     both = [mean_errors([state[:, column] for state in (*beside, *states)])[len(beside) :] for column in (0, 1)]
     return [
-        replace(part, std=np.array([u.std, r.std]), density=np.array([u.density, r.density]))
+        replace(part, std=np.array([u[0], r[0]]), density=np.array([u[1], r[1]]))
         for part, u, r in zip(parts, *both, strict=True)
     ]
 
@@ -304,7 +296,7 @@ def _problems(own: StepSample, hold: Hold, data: Transient, response: Response) 
     return found
 
 
-def _middle(own: StepSample, batch: Sailed, hold: Hold, response: Response) -> Middle:
+def _middle(own: StepSample, batch: Sailed, hold: Hold, response: Response) -> tuple[Array, float]:
     """The state that the command drives as fitted, the others as measured about that time."""
     assert hold.channel is not None
     half = hold.begin + round((response.delay_s + response.time_constant_s * math.log(2)) / batch.sample_time_s)
@@ -313,7 +305,7 @@ def _middle(own: StepSample, batch: Sailed, hold: Hold, response: Response) -> M
     state = batch.state[part].mean(axis=0) if part.start < part.stop else own.location
     state[hold.channel] = own.location[hold.channel]
     sway = batch.sway[part]
-    return Middle(state=state, sway=float(sway.mean()) if len(sway) else math.nan)
+    return state, float(sway.mean()) if len(sway) else math.nan
 
 
 def modified_scores(values: Array) -> Array:

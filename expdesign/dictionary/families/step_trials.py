@@ -15,7 +15,6 @@ experiments, in Sensing and Control for Autonomous Vehicles (2017).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -198,12 +197,8 @@ STAIRCASE_SETTINGS = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Level:
-    """One level of a staircase."""
-
-    approach: Approach  # straight run at the level's engine order
-    helm_rad: float  # counted from the approach's, positive to starboard
+Level = tuple[Approach, float]
+"""Of a staircase: the straight run at its engine order, and its helm [rad] from that, positive to starboard."""
 
 
 def rises(request: PrimitiveSpec) -> Array:
@@ -231,10 +226,8 @@ def staircase(request: PrimitiveSpec, begin: Approach, levels: Sequence[Level]) 
     if given_s:
         times_s = np.full(len(levels), given_s / (2 * len(levels) - 1))
     else:
-        motions = np.array([steady_turn(level.approach, level.helm_rad) for level in levels])
-        inputs = np.array(
-            [level.approach.helm.inputs(level.approach.drive, _angle(begin, level.helm_rad)) for level in levels]
-        )
+        motions = np.array([steady_turn(*level) for level in levels])
+        inputs = np.array([one.helm.inputs(one.drive, _angle(begin, helm_rad)) for one, helm_rad in levels])
         times_s = np.ceil(hold_times(begin.helm.vessel, motions, inputs, request.settings) / step_s) * step_s
     stairs = [*range(len(levels)), *range(len(levels) - 2, -1, -1)]
     ends_s = np.cumsum(times_s[stairs])
@@ -242,7 +235,7 @@ def staircase(request: PrimitiveSpec, begin: Approach, levels: Sequence[Level]) 
     place = np.searchsorted(ends_s - step_s / 2, np.arange(samples) * step_s, side="right")
     now = np.array(stairs)[np.minimum(place, len(stairs) - 1)]
     drive, helm = (
-        np.array(values)[now] for values in zip(*((x.approach.drive, x.helm_rad) for x in levels), strict=False)
+        np.array(values)[now] for values in zip(*((one.drive, helm_rad) for one, helm_rad in levels), strict=False)
     )
     return ordered(begin, drive, helm)
 
@@ -305,7 +298,7 @@ def _orders_rudder_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     if abs(least) >= abs(most):
         raise InputError(f"least_helm_rad is {abs(least):g}, expected less than the largest helm, {abs(most):g}")
     angles = _evenly_turning(approach, least, most, rises(request))
-    return staircase(request, approach, [Level(approach=approach, helm_rad=angle) for angle in angles.tolist()])
+    return staircase(request, approach, [(approach, angle) for angle in angles.tolist()])
 
 
 def _evenly_turning(approach: Approach, least: float, most: float, shares: Array) -> Array:
@@ -353,7 +346,7 @@ def _orders_throttle_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation
     settings = request.settings
     speeds = settings["speed_mps"] * (1.0 + (settings["rise"] - 1.0) * rises(request))
     approaches = [steady_ahead(vessel, speed) for speed in speeds.tolist()]
-    levels = [Level(approach=one, helm_rad=eased(request, one.drive, settings["helm_rad"])) for one in approaches]
+    levels = [(one, eased(request, one.drive, settings["helm_rad"])) for one in approaches]
     return staircase(request, steady_ahead(vessel, settings["speed_mps"]), levels)
 
 

@@ -138,17 +138,9 @@ def _windowed(series: Array, weights: Array) -> Array:
 # The covariance of weighted sums of noise that consists of parts, ends of batches included.
 
 
-@dataclass(frozen=True, eq=False)
-class Scores:
-    """How sums over samples of W eps vary, for outputs o with W (k, p_o)."""
-
-    blocks: list[list[Array]]  # (p_o, p_o') covariances of the sums of outputs o and o'
-    doubts: list[Array]  # (p_o,) variance of each estimated variance
-
-
 def score_covariance(
     W: Sequence[Array], residuals: Array, fitted: Sequence[Components], parts: Sequence[Stretch]
-) -> Scores:
+) -> tuple[list[list[Array]], list[Array]]:
     """The covariance of sum W_o eps_o, and how well the variances are known that it is made of.
 
     Parts of different outputs are as correlated as the outputs' residuals are at the same sample.
@@ -158,12 +150,15 @@ def score_covariance(
         residuals: (k, n).
         fitted: the parts of each output.
         parts: `stretches`.
+
+    Returns:
+        (p_o, p_o') covariances of the sums of outputs o and o', and (p_o,) variance of each estimated variance.
     """
     variances = np.array([item.variances for item in fitted])
     doubted = np.array([np.diag(item.uncertainty) > 0 for item in fitted])
     blocks, units = sums_of_parts(W, variances, fitted[0].slow, _common(residuals, variances), parts, doubted)
     doubts = [np.einsum("ip,ij,jp->p", own, item.uncertainty, own) for own, item in zip(units, fitted, strict=True)]
-    return Scores(blocks, doubts)
+    return blocks, doubts
 
 
 def sums_of_parts(

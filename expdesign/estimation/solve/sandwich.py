@@ -244,8 +244,8 @@ def _exact(
 ) -> tuple[Array, Array]:
     """(p, p) covariance of an estimate under noise of these parts, and (p,) factors of its standard deviations."""
     P, doubt = np.zeros((p, p)), np.zeros(p)
-    scores = score_covariance([item.W for item in by], residuals, fitted, places)
-    for row, line, own in zip(columns, scores.blocks, scores.doubts, strict=True):
+    blocks, doubts = score_covariance([item.W for item in by], residuals, fitted, places)
+    for row, line, own in zip(columns, blocks, doubts, strict=True):
         doubt[row] += own
         for column, block in zip(columns, line, strict=True):
             P[np.ix_(row, column)] += block

@@ -86,8 +86,8 @@ def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
         record=np.array([one.hold.batch for one, _ in held], dtype=np.int64),
         steady_std=np.maximum(std, 1e-9),
         middle=States(
-            state=np.array([one.middle.state for one, *_ in steps if one.middle is not None]),
-            sway=np.array([one.middle.sway for one, *_ in steps if one.middle is not None]),
+            state=np.array([one.middle[0] for one, *_ in steps if one.middle is not None]),
+            sway=np.array([one.middle[1] for one, *_ in steps if one.middle is not None]),
             inputs=np.array([one.plateau.inputs for one, *_ in steps if one.plateau is not None]),
         ),
         output=np.array([2 * (one.hold.channel or 0) for one, *_ in steps]),
