@@ -39,7 +39,13 @@ def test_a_folder_of_a_card_designs_a_trial_of_her_own_size(name: str, tmp_path:
 
 def test_kinds_follow_from_thrusters_and_rudders() -> None:
     kinds = {name: kind_of(load_card(path)) for name, path in (CARDS | SHIPS).items()}
-    others = {"otter": "asv", "albatross": "asv", "macginitie": "azimuth", "offshore-45m": "azimuth"}
+    others = {
+        "otter": "asv",
+        "albatross": "asv",
+        "macginitie": "azimuth",
+        "offshore-45m": "azimuth",
+        "naval-vessel": "twin-screw",
+    }
     assert kinds == dict.fromkeys(kinds, "propeller-rudder") | others
 
 

@@ -195,3 +195,21 @@ def test_a_leg_past_an_islet_is_found_though_the_fastest_one_in_its_corridor_cut
     values = find_leg(task, water)
     assert values is not None
     assert water.holds(water.states(start, values)[:, :3])
+
+
+@pytest.mark.parametrize(("hulls", "enough"), [(16.0, True), (7.0, False)])
+def test_a_leg_without_room_to_gather_speed_is_hardly_tried(hulls: float, enough: bool) -> None:
+    """Her own helmsman, who follows the first guess, says so; IPOPT would go to and fro with every guess."""
+    water = open_water(coaster())
+    vessel, ship = water.vessel, water.ship
+    slow, swift = (steady_ahead(vessel, share * ship.transit_speed_mps) for share in (0.4, 1.0))
+    task = LegTask(
+        start=np.array([0.0, 0.0, 0.0, *slow.velocity]),
+        end=np.array([hulls * vessel.length_m, 2.0 * vessel.length_m, 0.3, *swift.velocity]),
+        start_inputs=slow.inputs,
+        end_inputs=swift.inputs,
+        seed=1,
+        budget=WorkBudget(most_s=40.0),
+    )
+    assert (find_leg(task, water) is not None) == enough
+    assert task.budget.spent_s < 5.0

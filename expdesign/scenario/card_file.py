@@ -60,7 +60,11 @@ class ThrusterTable(Table):
         default=None, ge=0.3, le=2.0, description="pitch by diameter; from the top speed when not given"
     )
     astern_percent: float = Field(
-        default=70.0, ge=0.0, le=100.0, description="the shaft speed at full astern, of that ahead [%]"
+        default=70.0,
+        ge=0.0,
+        le=100.0,
+        description="the shaft speed at full astern, of that ahead [%]; 0 where it does not reverse: azimuths that can "
+        "turn round then do",
     )
     full_order_s: Positive | None = Field(
         default=None,

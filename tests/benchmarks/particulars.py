@@ -1,8 +1,8 @@
 """Published ships: their trials predicted from particulars alone, and after one circle and one speed are known.
 Cards are in `ships/`, each with its sources. The ships are compared with what was measured where the card states it
 (the model of KVLCC2, free running; top speeds of two boats), and otherwise with simulations of the ship's published
-model, each written in `published_models.py`. The scatter of the factors was set with these ships, but for KCS, which
-was added later.
+model, each written in `published_models.py`. The scatter of the factors was set with these ships, but for KCS and the
+naval vessel, which were added later.
 
     python tests/benchmarks/record.py particulars
 """
@@ -31,6 +31,7 @@ MODELS: dict[str, Callable[[], published.Model]] = {
     "tanker-190k": published.tanker_190k,
     "esso-osaka-model": published.esso_osaka,
     "otter": published.otter,
+    "naval-vessel": published.naval_vessel,
 }
 MEASURED = ("kvlcc2-model", "albatross", "macginitie")
 HARD = math.radians(35.0)

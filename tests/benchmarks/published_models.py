@@ -386,3 +386,30 @@ def otter() -> Model:
         return np.array([total_x / (mass + added), dv, dr])
 
     return Model(length_m=length, speed_mps=5.5 * KNOT, rates=rates, helm_rate_radps=100.0)
+
+
+def naval_vessel() -> Model:
+    """A naval vessel of 51.5 m upright: M. Blanke and A. Christensen (1993), as T. Perez gives it (MSS, navalvessel.m).
+
+    Its roll is left out. Rudder forces are the lift of two of the rudders in the ship's own flow, with the lift slope
+    and the stall angle stated; the thrust is that which holds the speed, as the model has no propeller.
+    """
+    length, rho, speed = 51.5, 1014.0, 8.0
+    mass, x_g, i_z, lever = 357.0 * rho, -3.38, 47.934e6, 20.41 + 3.38
+    left = np.array([[mass + 393000.0, mass * x_g + 1400000.0], [mass * x_g - 538000.0, i_z + 38.7e6]])
+    area, slope, stall = 2 * 1.5, math.degrees(0.054), math.radians(23.0)
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        u, v, r = x
+        inflow = delta + math.atan2(v - lever * r, max(abs(u), 1e-6))
+        lift = rho / 2 * area * (u * u + (v - lever * r) ** 2) * slope * float(np.clip(inflow, -stall, stall))
+        total_x = -1960.0 * u * abs(u) + 0.33 * mass * v * r + mass * (r * v + x_g * r * r)
+        total_x += 1960.0 * (order * speed) ** 2 - abs(lift * math.sin(delta))
+        total_y = -11800.0 * abs(u) * v + 131000.0 * u * r - 3700.0 * v * abs(v) - 794000.0 * v * abs(r)
+        total_y += -182000.0 * r * abs(v) - mass * u * r - lift * math.cos(delta)
+        total_n = -92000.0 * abs(u) * v - 4710000.0 * abs(u) * r - 202000000.0 * r * abs(r) - 15600000.0 * r * abs(v)
+        total_n += -mass * x_g * u * r + lever * lift * math.cos(delta)
+        dv, dr = np.linalg.solve(left, np.array([total_y, total_n]))
+        return np.array([total_x / (mass + 17400.0), dv, dr])
+
+    return Model(length_m=length, speed_mps=speed, rates=rates, helm_rate_radps=math.radians(2.32))

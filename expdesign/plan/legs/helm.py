@@ -24,6 +24,7 @@ from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
+from expdesign.plan.legs.sailed import gathers_speed
 from expdesign.plan.legs.water import (
     ARRIVAL,
     FoundLeg,
@@ -212,7 +213,9 @@ def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: R
     braking_m = ship.stopping_m if _stops(task, water) else 0.0
     transit = steady_transit(path, braking_m, water, ship)
     if transit is None:
-        return solve_leg(_problem(task, water, ship, check, path, share))
+        problem = _problem(task, water, ship, check, path, share)
+        doubtful = problem.guesses == 1 and task.budget.spent_s > 0.0  # one such attempt on a leg is enough
+        return None if doubtful else solve_leg(problem)
     steady = transit.commands[0]
     before = solve_leg(
         _problem(replace(task, end=transit.states[0], end_inputs=steady), water, ship, check, transit.to, share)
@@ -345,7 +348,10 @@ def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, pa
         turning_rate_radps=ship.yaw_rate_radps,
         node_s=HELM_NODE * water.vessel.length_m / ship.transit_speed_mps,
     )
-    return replace(wide, room_port_m=share * wide.room_port_m, room_starboard_m=share * wide.room_starboard_m)
+    narrow = replace(wide, room_port_m=share * wide.room_port_m, room_starboard_m=share * wide.room_starboard_m)
+    if _stops(task, water) or gathers_speed(states, duration_s, task, water, ship):
+        return narrow
+    return replace(narrow, guesses=1)
 
 
 def _last_inputs(task: LegTask, vessel: Vessel, helm: Helm, guessed: Array) -> Array:

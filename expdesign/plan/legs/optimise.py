@@ -71,7 +71,8 @@ def _solved(problem: LegProblem) -> tuple[Array | None, float]:
 
 def _fastest_and_smooth(problem: LegProblem) -> Array | None:
     sample_s = problem.vessel.sample_time_s
-    for guess, stretch in ((problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)):
+    guesses = (problem, 1.0), (_even(problem), 1.0), (problem, 1.6), (problem, 3.0)
+    for guess, stretch in guesses[: problem.guesses]:
         guess_s = stretch * problem.duration_s
         nodes, block = _size(problem, guess_s)
         fastest = program(problem.vessel, problem.environment, nodes, block, True)

@@ -47,6 +47,7 @@ class LegProblem:
     # (2,) value of displacement to north and east [s/m] for legs that may end anywhere, if it is zero with any heading;
     # None for legs that end at `end`
     displacement_value: Array | None = None
+    guesses: int = 4  # first guesses tried at most; fewer where such a leg is doubtful
     budget: WorkBudget = field(default_factory=WorkBudget)  # work budget; once it is exhausted, nothing is found
 
     def __post_init__(self) -> None:
