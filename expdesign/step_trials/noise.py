@@ -62,8 +62,14 @@ def mean_errors(parts: Sequence[Array]) -> tuple[tuple[float, float], ...]:
 
 
 def _wider(independent: float) -> float:
-    """Factor by which 1.96 deviations that so many values tell are widened to hold 95 %, by Student's distribution."""
-    return float(scipy.stats.t.ppf(0.975, max(independent, 1.0)) / scipy.stats.norm.ppf(0.975))
+    """Factor by which 1.96 deviations that so many values tell are widened to hold 95 %, by Student's distribution.
+
+    The power at frequency zero comes from an autoregression: with one of first order phi and n values its relative
+    variance is 4 (1 + phi) / (1 - phi) / n, twice that of the variance of n (1 - phi) / (1 + phi) independent values.
+
+    Source: K. N. Berk, Annals of Statistics 2 (1974), 489-502, for errors of autoregressive spectra.
+    """
+    return float(scipy.stats.t.ppf(0.975, max(independent / 2.0, 1.0)) / scipy.stats.norm.ppf(0.975))
 
 
 def _apart(part: Array, per: int) -> Array:
