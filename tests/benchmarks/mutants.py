@@ -49,7 +49,10 @@ FILES = {
         "vessel_regressors_are_the_published_ones", "vessel_priors_keep_to_what_is_known",
         "vessel_actuators_push_where_they_point", "vessel_coupled_inertia_obeys_mechanics",
     ),
-    "monitoring/cusum": ("monitoring_alarms_are_rare_and_right",),
+    "monitoring/cusum": (
+        "monitoring_sums_are_pages", "monitoring_filter_judges_all_stretches_together",
+        "monitoring_alarms_are_rare_and_right",
+    ),
 }  # fmt: skip
 """Files of the package, and the tests that ought to notice."""
 TIMEOUT_S = 300.0

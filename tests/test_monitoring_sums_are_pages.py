@@ -1,0 +1,151 @@
+"""Sums of log-likelihood ratios are Page's: largest over all beginnings, begun anew at zero, with a known threshold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+from expdesign.monitoring import Calibration, Rules, State, calibrate, threshold, watch
+from expdesign.monitoring.cusum import SURELY, TUNED_TO, _less, _scattered, _summed, _waited, estimates, soonest
+from expdesign.monitoring.force import Judged
+from monitoring_case import CHANGES, STRETCH_S, drawn_columns, drawn_grams, grams_from
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    return calibrate(drawn_grams(600, seed=0))
+
+
+def stretch(score: np.ndarray, information: np.ndarray, forces: int) -> Judged:
+    """One whose scores no force takes part of."""
+    none, square = np.zeros(forces), np.zeros((forces, forces))
+    return Judged(
+        score=score, information=information, by_force=np.zeros((len(score), forces)), force_score=none,
+        force_information=square, quadratic=np.array(0.0), grown=np.eye(forces), gain=square, towards=none,
+        seen=(np.zeros((forces, len(score))), square),
+    )  # fmt: skip
+
+
+def test_a_sum_is_the_largest_over_all_beginnings_and_knows_its_own(calibration: Calibration) -> None:
+    """Of both directions of each change: ratio d score - d^2 information / 2, over the inflation of its variance."""
+    rng, count = np.random.default_rng(1), 60
+    inflation = np.array([1.0, 1.5, 2.0, 3.0])
+    calibration = replace(calibration, inflation=inflation)
+    scores = rng.normal(0.3, 1.0, (count, CHANGES))
+    sizes = rng.uniform(0.5, 1.5, (count, CHANGES))
+    signs = np.concatenate([np.ones(CHANGES), -np.ones(CHANGES)])
+    twice = [np.tile(values, (1, 2)) for values in (scores, sizes)]
+    ratios = (TUNED_TO * signs * twice[0] - TUNED_TO**2 / 2.0 * twice[1]) / np.tile(inflation, 2)
+    state = State.begun(calibration, time_s=0.0)
+    for number in range(count):
+        before = state = replace(state, until_s=STRETCH_S * (number + 1))
+        one = stretch(scores[number], np.diag(sizes[number]), len(state.known.mean))
+        state, step = _summed(state, one, before, STRETCH_S * number, calibration)
+        from_each = np.cumsum(ratios[number::-1], axis=0)[::-1]  # (beginnings, 2 m), to now
+        wanted = np.maximum(from_each.max(axis=0), 0.0)
+        assert state.ratios == pytest.approx(wanted, abs=1e-9)
+        best = from_each.argmax(axis=0)
+        for place in np.flatnonzero(wanted > 0):
+            begun = best[place]
+            assert state.sums.since_s[place] == STRETCH_S * begun
+            assert state.sums.stretches[place] == number + 1 - begun
+            assert state.sums.score[place] == pytest.approx(scores[begun : number + 1].sum(axis=0))
+            since = np.cumsum(ratios[begun : number + 1, place])
+            assert state.peaks[place] == pytest.approx(since.max())
+        assert (step.statistic, step.change) == (state.ratios.max(), state.ratios.argmax() % CHANGES)
+
+
+def test_a_change_that_is_not_watched_has_no_sum(calibration: Calibration) -> None:
+    calibration = replace(calibration, rate=calibration.rate * [1.0, 0.0, 1.0, 1.0])
+    state = State.begun(calibration, time_s=0.0)
+    one = stretch(np.array([5.0, 9.0, -7.0, 0.0]), np.eye(CHANGES), len(state.known.mean))
+    state, step = _summed(state, one, state, 0.0, calibration)
+    assert (state.ratios > 0).tolist() == [True, False, False, False, False, False, True, False]
+    assert step.change == 2
+
+
+def test_the_threshold_is_never_below_that_of_one_sum_a_stretch() -> None:
+    assert threshold(1, 0.1) == pytest.approx(math.log(2.0))
+    assert threshold(3, 50.0) == pytest.approx(math.log(300.0))
+
+
+@pytest.mark.parametrize(("rate", "limit"), [(0.7, 9.0), (3.0, 12.5), (40.0, 5.0)])
+def test_the_soonest_alarm_is_that_of_a_change_whose_scores_are_as_expected(rate: float, limit: float) -> None:
+    """A change of the size that matters moves each score by its information."""
+    total, count = 0.0, 0
+    while total < limit:
+        total, count = total + TUNED_TO * rate - TUNED_TO**2 / 2.0 * rate, count + 1
+    assert soonest(np.array([rate, 0.0]), limit).tolist() == [count, math.inf]
+
+
+def test_products_of_a_changed_ship_are_those_of_what_it_leaves() -> None:
+    """X'X and X'e with e less X times the change."""
+    rng = np.random.default_rng(2)
+    table, change = rng.standard_normal((30, 6)), rng.standard_normal(3)
+    left = table.copy()
+    left[:, -1] -= table[:, :3] @ change
+    assert _less(table.T @ table, change) == pytest.approx(left.T @ left)
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_sizes_since_the_watch_began_are_right_within_what_is_stated(calibration: Calibration, number: int) -> None:
+    """Over voyages: errors are one standard deviation, within 4 of their errors, and no alarm is asked for."""
+    change, far = np.zeros(CHANGES), []
+    change[number] = 0.8
+    for seed in range(24):
+        state = State.begun(calibration, time_s=0.0)
+        grams = grams_from(drawn_columns(15, seed=700 + seed, change=change))
+        state, *_ = watch(calibration, state, grams, rules=Rules(limit=np.inf))
+        value, std = estimates(state, calibration)
+        far.append((value[number] - change[number]) / std[number])
+    mean_square = float(np.mean(np.square(far)))
+    assert 1.0 - 4.0 * math.sqrt(2.0 / 24) < mean_square < 1.0 + 4.0 * math.sqrt(2.0 / 24)
+    assert abs(np.mean(far)) < 4.0 / math.sqrt(24)
+
+
+def test_time_without_a_stretch_lets_what_is_known_of_the_force_fade(calibration: Calibration) -> None:
+    """Its mean by its autocorrelation over the gap, and its variance towards that of the force."""
+    state, *_ = watch(
+        calibration, State.begun(calibration, time_s=0.0), drawn_grams(20, seed=3), rules=Rules(limit=99.0)
+    )
+    gap_s = 500.0
+    later = _waited(replace(state, heading=1.0), calibration, state.until_s + gap_s, 1.0)
+    keep = calibration.nuisance.memory(gap_s, 0.0)
+    assert later.until_s == state.until_s + gap_s
+    assert later.known.mean == pytest.approx(keep * state.known.mean)
+    assert later.sums.taken == pytest.approx(keep[:, None] * state.sums.taken)
+    assert later.whole.taken == pytest.approx(keep[:, None] * state.whole.taken)
+
+
+def test_scores_that_all_say_the_same_do_not_scatter_and_gusts_do(calibration: Calibration) -> None:
+    """What they say beyond a steady change is the sum of squares about their weighted mean."""
+    inflation, sizes = 1.5, np.array([1.0, 2.0, 0.5, 1.5, 1.0, 3.0])
+    calibration = replace(calibration, inflation=np.full(CHANGES, inflation))
+    for steady, gust in ((0.8, 0.0), (0.8, 6.0), (0.0, 9.0)):
+        state = State.begun(calibration, time_s=0.0)
+        seen = steady + gust * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+        for size, value in zip(sizes, seen, strict=True):
+            one = stretch(np.full(CHANGES, value * size), size * np.eye(CHANGES), len(state.known.mean))
+            state = replace(state, sums=state.sums.added(one)[0])
+        mean = np.average(seen, weights=sizes)
+        rest = float(sizes @ (seen - mean) ** 2) / inflation / scipy.stats.chi2.ppf(SURELY, len(sizes) - 1)
+        assert _scattered(state, 1, calibration) == pytest.approx(max(1.0, rest))
+        assert (rest > 1.0) == (gust > 0.0)
+
+
+def test_time_in_which_a_large_sum_is_too_short_to_judge_adds_up(calibration: Calibration) -> None:
+    """A squall of four stretches: each adds its time while the sum is above the threshold."""
+    columns = drawn_columns(70, seed=110, quick=0.5)
+    columns[50:54, :, -1] += 2.0 * columns[50:54, :, 0]
+    grams, rules = grams_from(columns), Rules(limit=threshold(CHANGES, 1e3))
+    state, longest = State.begun(calibration, time_s=0.0), 0.0
+    for index in range(len(grams)):
+        before = state.undecided_s
+        state, *_ = watch(calibration, state, grams.part(slice(index, index + 1)), rules=rules)
+        assert state.undecided_s in (0.0, before + STRETCH_S)
+        longest = max(longest, state.undecided_s)
+    assert longest >= 2 * STRETCH_S
