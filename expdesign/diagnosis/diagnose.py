@@ -248,7 +248,10 @@ def diagnose(
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
     check_excitation(ship, windows)
-    unstable = Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
+    unstable = Diverged(
+        f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable. Estimate its parameters "
+        f"from these runs and others first (`expdesign estimate --method oe`), then diagnose what that writes"
+    )
     if simulate_from_measured(ship, windows).diverged:
         raise unstable
     begun, windows = with_longer_windows(ship, record, windows)
