@@ -280,9 +280,23 @@ def test_dead_sensors_and_idle_inputs_are_noted(tmp_path: Path) -> None:
     data = motion()
     record = loaded(tmp_path, data | {"wind_speed_mps": 0 * data["u_mps"] + 3, "n1_rps": 0 * data["u_mps"] + 5})
     assert record.notes == (
-        "trial.csv: n1_rps is 5 in all rows, so its effect cannot be estimated",
         "trial.csv: wind_speed_mps is 3 in all rows, a dead sensor?",
+        "trial.csv: n1_rps is 5 in all rows, so its effect cannot be estimated",
     )
+
+
+@pytest.mark.parametrize(
+    ("levels", "told"),
+    [((5, 5), True), ((5, 6), False), ((5, None), False), ((None, 5), False), ((None, None), False)],
+)
+def test_an_input_is_idle_where_no_file_moves_it(
+    tmp_path: Path, levels: tuple[float | None, float | None], told: bool
+) -> None:
+    data = motion()
+    columns = [data if level is None else data | {"n1_rps": 0 * data["u_mps"] + level} for level in levels]
+    paths = [write_trial(tmp_path / f"{name}.csv", own) for name, own in zip("ab", columns, strict=True)]
+    idle = "a.csv and 1 more file: n1_rps is 5 in all rows, so its effect cannot be estimated"
+    assert load_records(paths).notes == (idle,) * told
 
 
 def test_held_positions_are_noted(tmp_path: Path) -> None:

@@ -137,10 +137,8 @@ UNCHECKED = ("time_s", "batch", STEERED, "depth_m", "lat_deg", "lon_deg")
 def table_remarks(table: Table) -> Iterator[str]:
     """Remarks on the columns of a file."""
     for name, values in table.columns.items():
-        if name in UNCHECKED or np.ptp(values) > 0:
-            continue
-        what = "so its effect cannot be estimated" if is_input(name) else "a dead sensor?"
-        yield f"{table.sources[name].header} is {table.value(name, 0)} in all rows, {what}"
+        if name not in UNCHECKED and not is_input(name) and np.ptp(values) == 0:
+            yield f"{table.sources[name].header} is {table.value(name, 0)} in all rows, a dead sensor?"
     if "north_m" in table.columns:
         still = np.all(np.diff(table.stack("north_m", "east_m"), axis=0) == 0, axis=1)
         if HELD_SHARE < np.mean(still) < 1:
@@ -195,6 +193,7 @@ def load_records(
     whose, origin, limits = "the vessel", None, column_limits(actuators)
     batches: list[Batch] = []
     notes: dict[str, list[str]] = {}
+    stands: dict[str, set[str]] = {}  # column of an input -> what it is in files, "" where it moves
     for path, name in files.items():
         table, origin = _read(path, inputs, origin, limits)
         clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
@@ -205,6 +204,12 @@ def load_records(
         batches += found
         for note in remarks:
             notes.setdefault(note, []).append(name)
+        for column in filter(is_input, table.columns):
+            level = f"{table.sources[column].header} is {table.value(column, 0)}"
+            stands.setdefault(column, set()).add("" if np.ptp(table.columns[column]) > 0 else level)
+    for values in stands.values():
+        if values != {""} and len(values) == 1:  # another file may tell what one does not
+            notes[f"{values.pop()} in all rows, so its effect cannot be estimated"] = list(files.values())
     return Record(batches=tuple(batches), notes=tuple(f"{_listed(names)}: {note}" for note, names in notes.items()))
 
 
