@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from expdesign.assessment import Assessment, EstimateOptions, assess, with_unstated
+from expdesign.assessment import Assessment, EstimateOptions, assess, settled, with_unstated
 from expdesign.export.estimate_page import answer_sentence, current_sentence
 from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
@@ -111,6 +111,18 @@ def test_what_is_told_moves_the_estimate_from_the_truth() -> None:
     assert surprise(found(raw)) > 5
     stated = replace(SHIP, std={"rudder1_delay_s": 1.0})
     assert not found(raw, stated).answers
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("later_s", "early"), [(0.4, True), (0.0, False)])
+def test_orders_that_were_read_late_are_told_where_the_dead_time_is_estimated_too(later_s: float, early: bool) -> None:
+    """Without a dead time she answers 0.6 s before the row that shows her order; output error counts that."""
+    stated = replace(SHIP, std={"rudder1_delay_s": 1.0})
+    now, record = settled(stated, run(1, helm_later_s=later_s), OPTIONS)
+    told = assess(now, record, OPTIONS, stated=stated)
+    (note,) = [text for text in told.best.estimate.warnings if "rudder1_delay_s" in text]
+    assert ("The ship answers before the recorded orders, which were read late: rudder1 0." in note) == early
+    assert surprise(told) < 4
 
 
 @pytest.mark.thorough

@@ -25,6 +25,7 @@ from expdesign.vessel.quantities import rows_of
 
 MOST_DELIVERIES = 5  # how often data are delivered with new dead times and lags, at most
 SETTLED_CHANGE = 0.5  # change of such a time, in its standard deviations, below which it is not delivered again
+SURELY_EARLY = 3.0  # standard deviations by which a dead time is below zero from which it is told
 TIME_CHANGE = 0.1  # of a time, for derivatives, in samples
 
 
@@ -76,10 +77,15 @@ def value(vessel: Vessel, name: str) -> float:
 
 def found_times(found: Estimate, vessel: Vessel) -> dict[str, tuple[float, float]]:
     """Value and standard deviation of each time that an estimate found beside what the vessel delivers inputs with."""
+    return {name: (max(time, 0.0), own) for name, (time, own) in _free_times(found, vessel).items()}
+
+
+def _free_times(found: Estimate, vessel: Vessel) -> dict[str, tuple[float, float]]:
+    """The same; less than zero where the ship answers before the recorded orders."""
     names, std = found.nuisance_names, np.sqrt(np.diag(found.joint_covariance))[len(found.names) :]
     known = response_values(vessel.actuators)
     return {
-        name: (max(known[name] + change, 0.0), own)
+        name: (known[name] + change, own)
         for name, change, own in zip(names, found.nuisance_values.tolist(), std.tolist(), strict=True)
         if name in known
     }
@@ -168,6 +174,16 @@ def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Ve
         f"Uncertain dead times, lags and slew rates are estimated with the parameters: {', '.join(each)}. "
         "Standard deviations of the parameters count their errors."
     )
+    early = [
+        f"{name.removesuffix('_delay_s')} {-time:.2g} ± {own:.1g} s"
+        for name, (time, own) in _free_times(found, vessel).items()
+        if name.endswith("_delay_s") and time < -SURELY_EARLY * own
+    ]
+    if early:
+        note += (
+            f" The ship answers before the recorded orders, which were read late: {', '.join(early)}. Parameters count "
+            "that here. A dead time cannot, so that the vessel file and the other methods have 0, and these are biased."
+        )
     values = dict(zip(found.nuisance_names, found.nuisance_values.tolist(), strict=True))
     values |= {name: time for name, (time, _) in times.items()}
     return replace(found, nuisance_values=np.array(list(values.values())), warnings=(*found.warnings, note))
