@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json, sentences
-from expdesign.export.monitor_page import monitor_document
+from expdesign.export.monitor_page import MOST_LINEAR, monitor_document, statistic_figure
 from expdesign.export.pages import document_html
+from expdesign.export.pages.figures import report_style
 from expdesign.monitoring import (
     AS_LIKELY,
     Alarm,
@@ -295,6 +296,21 @@ def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], t
         false_alarm_days=1.0, alarms=alarms, moments=tuple(moments), left_out_rows=0, unread_rows=0, notes=(),
         command="",
     )  # fmt: skip
+
+
+def test_a_large_alarm_does_not_hide_the_threshold_on_the_page(calibration: Calibration) -> None:
+    """Its sum may be hundreds of times the threshold: the scale is linear up to that and logarithmic above."""
+    change, limit = np.array([0.0, 0.0, 4.0, 0.0]), threshold(CHANGES, 1e4)
+    content = content_of(
+        calibration, watched(calibration, drawn_grams(60, seed=6, change=change, since=40), limit), limit
+    )
+    largest = max(moment.statistic for moment in content.moments)
+    assert largest > MOST_LINEAR * limit
+    with report_style():
+        figure = statistic_figure(content)
+    ticks = [float(text) for text in re.findall(r">\s*(\d[\d.e+]*)\s*</text>", figure)]
+    assert {0.0, 10.0, 100.0} <= set(ticks)
+    assert "mathdefault" not in figure
 
 
 @pytest.mark.thorough

@@ -120,6 +120,8 @@ def budget_entries(content: MonitorContent) -> list[dict[str, object]]:
 
 SHOWN = 5
 """Largest number of estimates that are drawn."""
+MOST_LINEAR = 8.0
+"""Statistic in thresholds, above which its scale is logarithmic."""
 
 
 @page_figure
@@ -129,10 +131,14 @@ def statistic_figure(content: MonitorContent) -> str:
     axes = figure.subplots()
     begin_s, label = _axis(content)
     time = _hours([moment.time_s for moment in content.moments], begin_s)
-    axes.step(time, [moment.statistic for moment in content.moments], where="pre", color=BLUE, label="statistic")
+    statistics = [moment.statistic for moment in content.moments]
+    axes.step(time, statistics, ".-", where="pre", color=BLUE, label="statistic")
     axes.axhline(content.limit, color=GREY, linestyle="--", linewidth=0.9, label="threshold")
     for number, alarm in enumerate(content.found):
         axes.axvline((alarm.time_s - begin_s) / HOUR, color=VERMILION, linewidth=1.2, label=None if number else "alarm")
+    if max(statistics, default=0.0) > MOST_LINEAR * content.limit:
+        axes.set_yscale("symlog", linthresh=content.limit)  # linear up to the threshold
+        axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylim(0, None)
     axes.set_xlabel(label)
     axes.set_ylabel("log-likelihood ratio")

@@ -332,6 +332,7 @@ FROUDE = (
     "By Froude\u2019s law, in the same water: in sea water, 2.5 % heavier than fresh, mass, moments and inertia of the "
     "ship grow by as much. Damping by friction is relatively less at full scale."
 )
+STANDARD = "Behind \N{PLUS-MINUS SIGN} stands one standard deviation; intervals hold the truth in 95 % of trials."
 SENSITIVITY = (
     "One of these is enough where no direction is left open; the higher the sensitivity, the better. The sensitivity "
     "is that of the coefficients of all cases to relative changes of the parameters, along the direction that the data "
@@ -360,9 +361,9 @@ def roll_document(content: RollContent) -> Document:
             "held": list(estimate.held),
         },
         sections=filled(
-            section("Parameters", Table(header=PARAMETER_HEADER, rows=parameter_rows(content), texts=2)),
+            section("Parameters", Table(header=PARAMETER_HEADER, rows=parameter_rows(content), texts=2), STANDARD),
             section(as_long, scaled, FROUDE),
-            section("What would determine the rest", cures, SENSITIVITY),
+            section("What would determine the rest" if report.open else "What would tell more", cures, SENSITIVITY),
         ),
         notes=content.notes,
     )

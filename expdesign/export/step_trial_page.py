@@ -299,9 +299,9 @@ def step_trial_document(content: StepTrialContent) -> Document:
             "rudder": trial.controls.words[1],
             "holds": len(trial.holds),
             "steps_that_count": len(trial.counted),
-            **delays,
         },
         values={
+            **delays,
             "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
             "fit": {
                 part.name: {"Ur"[place]: part.fit_percent[place] for place, *_ in trial.model.halves}
