@@ -57,7 +57,8 @@ class Outcome:
     """What came of one ship."""
 
     ship: str
-    plan: str  # verified or not, and why
+    plan: str  # verified or not, and how long, or why not
+    prior: str  # joined with the estimate, "none" where the data alone tell enough
     inside: int  # trial values of the published model in the 95 % intervals of the estimated vessel
     values: int
     error: float  # median of the sizes of logarithms of predicted by true
@@ -194,6 +195,7 @@ def outcome(
         if status == 0:
             told = json.loads((folder / "plan" / "plan.json").read_text("utf-8"))
             plan = "drafted" if told.get("draft") else "verified" if told["verified"] else "not verified"
+            plan += f", {(told['informative_s'] + told['reposition_s']) / 60:.0f} min"
             chosen = {leg["name"] for leg in told["legs"]}
             runs = tuple(run for run in runs if run.name in chosen)
     data = []
@@ -202,7 +204,7 @@ def outcome(
         data.append(folder / f"{run.name}.csv")
         np.savetxt(data[-1], np.array(list(columns.values())).T, "%.9g", ",", header=",".join(columns), comments="")
     common = [*map(str, data), "--vessel", str(folder / "vessel-ahead.toml"), "--quiet"]
-    error = before = math.nan
+    error, before, joined = math.nan, math.nan, ""
     inside = np.array([], dtype=bool)
     # the data alone, or what the card says beside them where these say too little
     for prior in ("none", "parameter_std"):
@@ -212,7 +214,7 @@ def outcome(
         before = float(np.median(np.abs(deviations(files.vessel, one.values)[0])))
         with suppress(InputError):  # hardly any ship that the estimate draws brakes, or steers to the right side
             errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
-            error = float(np.median(np.abs(errors)))
+            error, joined = float(np.median(np.abs(errors))), prior
             break
     said = "not asked for"
     if diagnosed:
@@ -221,8 +223,8 @@ def outcome(
     if diagnosed and status == 0:
         said = str(json.loads((folder / "diagnosis" / "diagnosis.json").read_text("utf-8"))["verdict"])
     return Outcome(
-        ship=name, plan=plan, inside=int(inside.sum()), values=len(inside), error=error, before=before, said=said,
-        seconds=time.process_time() - began,
+        ship=name, plan=plan, prior=joined, inside=int(inside.sum()), values=len(inside), error=error, before=before,
+        said=said, seconds=time.process_time() - began,
     )  # fmt: skip
 
 
@@ -238,7 +240,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             options = ["--jobs", "1", *(["--draft"] if asked.draft else [])]  # so that all work is counted
             row = outcome(name, Path(folder) / name, planned=not asked.unplanned, options=options)
-        share = f"{row.inside} of {row.values}" if row.values else "-"
+        share = f"{row.inside} of {row.values}{' (prior)' * (row.prior == 'parameter_std')}" if row.values else "-"
         errors = f"{math.expm1(row.before):.0%} | {math.expm1(row.error):.0%}" if row.values else "- | -"
         print(f"| {name} | {row.plan} | {share} | {errors} | {row.said} | {row.seconds:.0f} s |", flush=True)
 
