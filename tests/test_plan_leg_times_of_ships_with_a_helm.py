@@ -93,20 +93,3 @@ def test_optimised_legs_take_as_long_as_the_rule_says(exit_mps, entry_mps, hulls
     assert values is not None
     seconds = len(values) * vessel.sample_time_s
     assert times.seconds(np.array(way_m), exit_mps, entry_mps) == pytest.approx(seconds, rel=0.1)
-
-
-def test_a_ship_speeds_up_only_after_she_has_recovered_from_the_run_before():
-    """What she sails while counter helm ends her turn is no room to get back to her speed in."""
-    times, still = rule(), np.zeros(2)
-    straight = np.array([times.off_m, 0.0, 0.0, times.off_m / times.speed_mps])
-    turning_m, turning_s = 240.0, 80.0
-    recovering = straight + np.array([turning_m, 0.0, 0.0, turning_s])
-    enough_m = _lengths_and_times(times, 3.0, 5.0)[0][0]
-
-    def leg_s(way_m: float, recovery: np.ndarray) -> float:
-        ends = np.zeros((1, 3)), np.array([[way_m, 0.0, 0.0]])
-        return float(times.between_s(*ends, recovery, 3.0, 5.0, current_to=still)[0])
-
-    assert leg_s(enough_m, straight) == pytest.approx(float(times.seconds(np.array(enough_m), 3.0, 5.0)))
-    assert leg_s(enough_m + turning_m, recovering) == pytest.approx(leg_s(enough_m, straight) + turning_s)
-    assert leg_s(enough_m, recovering) > leg_s(enough_m + turning_m, recovering)

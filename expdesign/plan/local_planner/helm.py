@@ -17,7 +17,6 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import APPROACH_HULLS, HelmShip, full_ahead, stopped
 from expdesign.plan.legs import (
-    STRAIGHT_OFF_HULLS,
     FoundLeg,
     LegTask,
     LegWater,
@@ -74,7 +73,6 @@ class HelmTimes:
     run_up_m: float
     steady_m: float
     at_rest_m: float  # of legs to a stop at least
-    off_m: float  # straight before the first turn
     spare_m: float  # before a run besides the distance in which speeds change
     answer_s: float  # until a new engine order takes effect
     speeding_up: Array  # (k, 3) speed m/s, distance m and time s from rest with the engines full ahead
@@ -111,17 +109,15 @@ class HelmTimes:
         """
         straight_m = self.straight_m(entry_mps)
         begins, ends = moved(froms, recovery[None, :3]), moved(tos, np.array([[-straight_m, 0.0, 0.0]]))
-        # a ship does not speed up before she has recovered: of that way only the straight at its end counts
-        recovered_s = max(float(recovery[3]) - self.off_m / self.speed_mps, 0.0)
-        along_m = straight_m + min(self.off_m, float(np.hypot(*recovery[:2])))
+        along_m = float(np.hypot(*recovery[:2])) + straight_m
         # legs are first guessed over ground: no turn all round
         over_ground_m = dubins_m(begins, ends, radius_m=self.radius_m)
-        leg_s = recovered_s + self.seconds(over_ground_m + along_m, exit_mps, entry_mps)
+        leg_s = self.seconds(over_ground_m + along_m, exit_mps, entry_mps)
         for _ in range(1, DRIFT_ROUNDS if current_to.any() else 1):
             through = np.column_stack([ends[:, :2] - leg_s[:, None] * current_to, ends[:, 2]])
             length_m = dubins_m(begins, through, radius_m=self.radius_m)
             length_m = np.where(over_ground_m > length_m + np.pi * self.radius_m, over_ground_m, length_m)
-            leg_s = recovered_s + self.seconds(length_m + along_m, exit_mps, entry_mps)
+            leg_s = self.seconds(length_m + along_m, exit_mps, entry_mps)
         return leg_s
 
     def straight_m(self, entry_mps: float) -> float:
@@ -152,7 +148,6 @@ def helm_times(ship: HelmShip) -> HelmTimes:
         run_up_m=ship.run_up_m,
         steady_m=APPROACH_HULLS * approach.helm.vessel.length_m,
         at_rest_m=STOP_LEG_HULLS * approach.helm.vessel.length_m,
-        off_m=STRAIGHT_OFF_HULLS * approach.helm.vessel.length_m,
         spare_m=RUN_LEG_SPARE_HULLS * approach.helm.vessel.length_m,
         answer_s=0.5 / approach.helm.drive_rate,
         speeding_up=_speeding_up(ship),
