@@ -76,6 +76,19 @@ def test_a_pull_out_of_a_stable_ship_goes_straight_again_and_a_circle_does_not()
     assert abs(circle.exit_velocity[2]) > 0.5 * turning
 
 
+@pytest.mark.parametrize("ship", SHIPS)
+def test_a_crash_stop_ends_the_way_ahead_and_does_not_go_astern(ship: str):
+    run = build_primitive(SHIPS[ship], request("crash_stop", ship))
+    u = run.trajectory.velocity[:, 0]
+    still = int(np.argmax(u <= 0.0))
+    assert still > 0  # in time
+    assert u.min() > -0.25 * u[0]  # what the propeller still does while it comes to rest
+    assert not run.commands.values[-1].any()  # engines are stopped
+    longer = build_primitive(SHIPS[ship], request("crash_stop", ship, astern_fraction=1.0))
+    np.testing.assert_array_equal(longer.trajectory.velocity[: still + 1], run.trajectory.velocity[: still + 1])
+    assert longer.trajectory.velocity[-1, 0] < u.min()  # goes astern for as long as it is told to
+
+
 def test_a_crash_stop_takes_the_way_off_faster_than_idling():
     hard, idle = (build_primitive(rudder_ship(), request("crash_stop", astern=share)) for share in (1.0, 0.0))
     assert hard.trajectory.velocity[-1, 0] < 0 < idle.trajectory.velocity[-1, 0]

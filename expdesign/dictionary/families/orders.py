@@ -14,10 +14,11 @@ import numpy as np
 from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
 from expdesign.dictionary.trim import hold
 from expdesign.errors import InputError
-from expdesign.simulation import Conduct, zigzag
+from expdesign.signals import Commands
+from expdesign.simulation import Conduct, simulate, zigzag
 from expdesign.simulation.helm import Approach, steady_ahead
 from expdesign.values import Array
-from expdesign.vessel import Vessel
+from expdesign.vessel import Vessel, within_limits
 
 # Engine and helm orders from a steady straight approach, for families defined by commands.
 
@@ -80,28 +81,36 @@ def helm_family(
     return orders
 
 
-# Crash stop: engines astern from a steady approach, helm unchanged.
+# Crash stop: engines astern from a steady approach, helm unchanged, until the ship lies still.
 
 
 def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     approach = steady_ahead(vessel, request.settings["speed_mps"])
-    time_s = run_times(vessel, request)
-    braking = time_s < request.settings["astern_fraction"] * request.settings["duration_s"]
-    return ordered(approach, np.where(braking, -request.settings["astern"], 0.0), 0.0 * time_s)
+    time_s, astern = run_times(vessel, request), -request.settings["astern"]
+    if share := request.settings["astern_fraction"]:
+        braking = time_s < share * request.settings["duration_s"]
+        return ordered(approach, np.where(braking, astern, 0.0), 0.0 * time_s)
+    whole = ordered(approach, np.full_like(time_s, astern), 0.0 * time_s)
+    sample_s = vessel.sample_time_s
+    values = within_limits(vessel.actuators, whole.commands, sample_time_s=sample_s, before=approach.inputs)
+    orders = Commands(sample_time_s=sample_s, names=vessel.model.inputs, values=values)
+    u_mps = simulate(vessel, orders, velocity=approach.velocity, standing=approach.inputs).velocity[:-1, 0]
+    still = np.cumsum(u_mps <= 0.0) > 0
+    return ordered(approach, np.where(still, 0.0, astern), 0.0 * time_s) if still.any() else whole
 
 
 CRASH_STOP = Family(
     name="crash_stop",
-    summary="engines astern from a straight approach for a share of the run, then stopped; helm unchanged",
+    summary="engines astern from a straight approach until the ship lies still, or for a share of the run; then stopped",
     settings=(
         DURATION,
         APPROACH,
         Setting(name="astern", meaning="engine order, 1 for full astern", default=1.0, low=0, high=1, searched="share"),
         Setting(
             name="astern_fraction",
-            meaning="share of the run that engines go astern",
-            default=1.0,
-            low=0.01,
+            meaning="share of the run that engines go astern; 0 for until the nominal ship lies still",
+            default=0.0,
+            low=0,
             high=1,
             searched="share",
         ),
