@@ -118,7 +118,7 @@ def test_harmless_flaws_change_nothing_and_are_noted(area):
     flawed = _water(area, collection(feature("land", [ring[0], *ring[:-1]], square(0.008))))
     assert flawed.water.equals(clean.water)
     assert clean.notes == ()
-    assert set(flawed.notes) == {"chart.geojson: 1 repeated points removed", "chart.geojson: 1 rings closed"}
+    assert set(flawed.notes) == {"chart.geojson: 1 repeated point removed", "chart.geojson: 1 ring closed"}
 
 
 def test_outlines_that_touch_themselves_keep_their_area(area):
@@ -127,7 +127,7 @@ def test_outlines_that_touch_themselves_keep_their_area(area):
     apart = [[[0, 0], [0.002, 0], [0.001, 0.001], [0, 0]], [[0, 0.002], [0.001, 0.001], [0.002, 0.002], [0, 0.002]]]
     by_hand = _water(area, collection(outer, *(feature("land", part) for part in apart)))
     assert touching.water.symmetric_difference(by_hand.water).area < 1e-6
-    assert touching.notes == ("chart.geojson: 1 polygons that touch themselves taken apart where they touch",)
+    assert touching.notes == ("chart.geojson: 1 polygon taken apart where it touches itself",)
 
 
 def test_flaws_that_leave_no_doubt_about_land_and_water_are_mended(area):
@@ -153,7 +153,7 @@ def test_flaws_that_leave_no_doubt_about_land_and_water_are_mended(area):
         mended = _water(area, collection(outer, feature("land", *rings)))
         clean = _water(area, collection(outer, feature("land", *drawn_well)))
         assert mended.water.symmetric_difference(clean.water).area < 1e-6
-        assert "taken apart where they touch" in mended.notes[0]
+        assert "taken apart where it touches itself" in mended.notes[0]
 
 
 @pytest.mark.parametrize("size_deg", [1e-5, 1e-4, 1e-3])

@@ -91,6 +91,7 @@ class Scenario:
             for name, std in zip(model.names, model.parameter_std.tolist(), strict=True)
             if not std and name not in certain
         ]
+        value_of = dict(zip(model.names, model.parameters.tolist(), strict=True))
         known = ", ".join(certain)
         if len(certain) == len(model.names):
             known = f"every parameter of the model: {known}"
@@ -103,9 +104,9 @@ class Scenario:
             *([f"no term of the vessel's model reads {', '.join(unread)}, so that these commands and their limits move "
                "no ship"] if unread else []),
             *([f"exactly known in drawn trials: {known}"] if certain else []),
-            *([f"no model.parameter_std of {', '.join(unstated)}: ships of drawn trials differ in them by the share "
-               "model.parameter_std_unstated"]
-              if unstated else []),
+            *([f"no model.parameter_std of {', '.join(unstated)}: ships of drawn trials differ in them by "
+               f"{100 * model.unstated_std[unstated[0]] / abs(value_of[unstated[0]]):.3g} % of their values "
+               "(model.parameter_std_unstated)"] if unstated else []),
             *(["plan.paths does not act: it is of ships that turn on the spot, and this one does not"]
               if self.plan.paths != PlanSettings.paths and not self._turns_on_the_spot else []),
             *(f"{key} does not act: {because}" for key, because in self._beside_others),

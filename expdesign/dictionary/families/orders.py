@@ -101,7 +101,7 @@ def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
 
 CRASH_STOP = Family(
     name="crash_stop",
-    summary="engines astern from a straight approach until the ship lies still, or for a share of the run; then stopped",
+    summary="engines astern from a straight approach until the ship lies still or for a share of the run, then stopped",
     settings=(
         DURATION,
         APPROACH,

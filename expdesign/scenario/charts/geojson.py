@@ -233,10 +233,10 @@ def _named(path: Path, number: int, layer: str) -> Entry:
 
 # Charts: the polygons of GeoJSON layers in degrees, every one checked.
 
-REPEATED = "repeated points removed"
-CLOSED = "rings closed"
-SPLIT = "polygons that touch themselves taken apart where they touch"
-MOVED = "polygons moved by a full turn: the chart crosses the antimeridian"
+REPEATED = "repeated point", "removed"
+CLOSED = "ring", "closed"
+SPLIT = "polygon", "taken apart where it touches itself"
+MOVED = "polygon", "moved by a full turn: the chart crosses the antimeridian"
 WORDS = {
     "Ring Self-intersection": "crosses itself",
     "Interior is disconnected": "crosses itself",
@@ -274,7 +274,7 @@ def read_layers(features: tuple[Feature, ...], names: Iterable[str], *, near_lon
         InputError: the layers hold no polygon.
     """
     layers: dict[str, list[shapely.Polygon]] = {name: [] for name in names}
-    repairs: Counter[str] = Counter()
+    repairs: Counter[tuple[str, str]] = Counter()
     for feature in features:
         if feature.layer in layers:
             polygons = feature_polygons(feature.geometry, feature.entry, near_lon_deg, repairs)
@@ -283,12 +283,12 @@ def read_layers(features: tuple[Feature, ...], names: Iterable[str], *, near_lon
                 near_lon_deg = float(shapely.get_coordinates(polygons[0].exterior)[:, 0].mean())
     if not any(layers.values()):
         raise InputError(f"holds no polygon in the layers {', '.join(layers)}, expected at least one")
-    notes = tuple(f"{count} {what}" for what, count in repairs.items() if count)
+    notes = tuple(f"{count} {what}{'s' * (count > 1)} {done}" for (what, done), count in repairs.items() if count)
     return Chart(layers={name: tuple(polygons) for name, polygons in layers.items()}, notes=notes)
 
 
 def feature_polygons(
-    geometry: object, entry: Entry, near_lon_deg: float | None, repairs: Counter[str]
+    geometry: object, entry: Entry, near_lon_deg: float | None, repairs: Counter[tuple[str, str]]
 ) -> list[shapely.Polygon]:
     """The valid polygons of a geometry; counts repairs.
 
@@ -315,7 +315,7 @@ def place_text(lat_deg: float, lon_deg: float) -> str:
     return f"{abs(lat_deg):.5f} {'NS'[lat_deg < 0]}, {abs(lon_deg):.5f} {'EW'[lon_deg < 0]}"
 
 
-def _ring(positions: Any, entry: Entry, repairs: Counter[str]) -> Array:
+def _ring(positions: Any, entry: Entry, repairs: Counter[tuple[str, str]]) -> Array:
     """One closed ring (k, 2) of longitude, latitude without repeated points."""
     ring = positions_of(positions, entry)[:, :2]
     kept = np.concatenate([[True], (np.diff(ring, axis=0) != 0).any(axis=1)])
@@ -377,7 +377,7 @@ def _continuous(rings: list[Array], entry: Entry) -> list[Array]:
     return [ring + np.array([360 * np.round((middle - ring[:, 0].mean()) / 360), 0]) for ring in unwrapped]
 
 
-def _valid(polygon: shapely.Polygon, entry: Entry, repairs: Counter[str]) -> list[shapely.Polygon]:
+def _valid(polygon: shapely.Polygon, entry: Entry, repairs: Counter[tuple[str, str]]) -> list[shapely.Polygon]:
     """The polygon itself, or its parts when it only touches itself.
 
     Its parts, the union of what the outline encloses less that of the holes, have the polygon's area only where no

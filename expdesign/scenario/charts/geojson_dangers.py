@@ -239,7 +239,7 @@ def _number(value: object) -> float:
 
 def _geometries(geometry: Mapping[str, Any], entry: Entry, near_lon_deg: float) -> Iterator[shapely.Geometry]:
     """The parts of a geometry, checked; those that are not polygons with their third coordinate, if all have one."""
-    kind, repairs = geometry.get("type"), Counter[str]()
+    kind, repairs = geometry.get("type"), Counter[tuple[str, str]]()
     if kind == "GeometryCollection":
         parts = geometry.get("geometries")
         for part in parts if isinstance(parts, list) else []:
