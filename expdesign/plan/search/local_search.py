@@ -25,7 +25,6 @@ TURN_DEG = (90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0)  # steps of the local s
 BLOCKS_AT_ONCE = 4  # moves of a block looked at together at first, four times as many then
 MOST_POSES = 10_000  # in the blocks of a sweep: all blocks of up to 37 runs, and of more runs the shorter ones
 SWEEPS = 20  # over all blocks of runs at most
-SWEEP_GAIN = 5e-4  # share of the time of legs that a sweep must save for another to follow
 SAME = 1e-3  # hull lengths and radians by which a leg may differ from a transition that was tried
 EQUAL = 6  # decimals to which times [s] are compared, so that rounding does not choose between mirror images
 LEAST_GAIN_S = 0.05  # for which a block is moved
@@ -177,8 +176,6 @@ def polished(space: SearchSpace, departure: Departure, runs: Sequence[int], pose
         if chain is before:
             break
         chain = legs.measured(chain.runs, chain.poses)
-        if chain.legs_s.sum() > (1.0 - SWEEP_GAIN) * before.legs_s.sum():
-            break
     return Polished(poses=chain.poses, seconds=measured_s(space, runs, chain.poses, departure), moves=moves)
 
 
