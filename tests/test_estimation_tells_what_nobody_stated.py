@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import Assessment, EstimateOptions, assess, settled, with_unstated
+from expdesign.assessment.unstated import _surest
 from expdesign.export.estimate_page import answer_sentence, current_sentence
 from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
@@ -150,3 +151,8 @@ def test_of_runs_without_anything_unknown_few_are_told_of() -> None:
     """Each of two times and a current passes three standard deviations in 3 of 1000 runs: of 20, at most 2."""
     told = [found(run(seed)) for seed in range(100, 120)]
     assert sum(bool(one.answers) or one.current is not None for one in told) <= 2
+
+
+def test_what_is_no_number_is_told_as_nothing():
+    assert _surest(np.array([1.0, 1.0]), np.array([[np.nan, 0.0], [0.0, 1.0]])) == []
+    assert [index for index, *_ in _surest(np.array([1.0, 4.0]), np.eye(2))] == [1]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from expdesign.assessment.actuator_times import (
     delivered_anew,
     found_times,
@@ -198,11 +200,11 @@ def with_unstated(
             free = again(vessel, found.record, known_times(vessel, vessel, found.record))
             flow = current(held, free)
             method, held = (own.method, held) if flow is None else (method, free)
-    except (InputError, NoAnswer):  # without headings, say
+    except (InputError, NoAnswer, np.linalg.LinAlgError):  # without headings, say
         method = own.method
     try:
         late = answers(held, raw, vessel, again, smoothed=smoothed)
-    except (InputError, NoAnswer):
+    except (InputError, NoAnswer, np.linalg.LinAlgError):  # times that the data do not tell apart
         late = ()
     return replace(found, current=flow, answers=late)
 

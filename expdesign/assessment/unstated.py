@@ -140,7 +140,7 @@ def _surest(times: Array, covariance: Array) -> list[tuple[int, float, float]]:
             (_beside(information, score, [*chosen, index]) for index in range(len(times)) if index not in chosen),
             key=lambda one: abs(one[1]) / one[2],
         )
-        if abs(best[1]) < SURE * best[2]:
+        if not abs(best[1]) >= SURE * best[2]:  # nor where a number is not finite
             break
         found.append(best)
     return found
