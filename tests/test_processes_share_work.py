@@ -100,8 +100,8 @@ def grown_by(megabytes):
     return os.getpid(), len(KEPT)
 
 
+@pytest.mark.optional  # without psutil, which the extras bring, loky does not know how large a process is
 def test_a_process_that_keeps_what_it_built_goes_on():
-    pytest.importorskip("psutil", reason="without it loky does not know how large a process is")
     with local_processes(2):
         found = list(in_order(grown_by, (), [(1,), (1,), *[(150,)] * 6]))
     assert len({process for process, _ in found}) == 2  # not replaced

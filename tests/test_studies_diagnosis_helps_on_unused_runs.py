@@ -33,7 +33,7 @@ def test_the_truth_of_a_dead_time_may_be_below_zero(late: int) -> None:
         replace(batch, inputs=np.concatenate([np.repeat(batch.inputs[:1], late, axis=0), batch.inputs])[: len(batch)])
         for batch in record.batches
     ]
-    found = of_model(vessel_of("barge"), replace(record, batches=tuple(batches)), ["delay:all"])
+    found = of_model(vessel_of("barge"), replace(record, batches=tuple(batches)), ["delay:all"], beside={})
     assert found["delay:all"] == pytest.approx(-0.5 * late, abs=0.02)
 
 
