@@ -187,7 +187,7 @@ def with_unstated(
     own = next((item for item in (found.best, *found.methods) if item.method.solver == "oe"), None)
     if own is None or options.motion != CONTINUOUS:
         return found
-    method, held, flow = own.method, own.estimate, None
+    method, held, flow, notes = own.method, own.estimate, None, list(found.notes)
 
     def again(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
         work = Work(vessel=ship, stated=ship, record=record, options=replace(options, horizon_s=own.horizon_s))
@@ -200,13 +200,15 @@ def with_unstated(
             free = again(vessel, found.record, known_times(vessel, vessel, found.record))
             flow = current(held, free)
             method, held = (own.method, held) if flow is None else (method, free)
-    except (InputError, NoAnswer, np.linalg.LinAlgError):  # without headings, say
+    except (InputError, NoAnswer, np.linalg.LinAlgError) as error:
         method = own.method
+        notes.append(f"Whether there is a current that nobody stated is not known: {error}.")
     try:
         late = answers(held, raw, vessel, again, smoothed=smoothed)
-    except (InputError, NoAnswer, np.linalg.LinAlgError):  # times that the data do not tell apart
+    except (InputError, NoAnswer, np.linalg.LinAlgError) as error:
         late = ()
-    return replace(found, current=flow, answers=late)
+        notes.append(f"Whether inputs are answered when the vessel file says is not known: {error}.")
+    return replace(found, current=flow, answers=late, notes=tuple(notes))
 
 
 def _kept(trials: Sequence[Trial], beside: Sequence[Trial], best: Sequence[int]) -> list[Trial]:

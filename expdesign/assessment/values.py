@@ -76,7 +76,7 @@ class Assessment:
     methods: tuple[Assessed, ...]  # one entry for each method that gave an estimate, in the order of the options
     # methods, or horizons of output error, that gave no estimate, and why
     failures: tuple[tuple[str, InputError | NoAnswer], ...]
-    notes: tuple[str, ...]  # on methods that were not tried
+    notes: tuple[str, ...]  # on methods that were not tried, and on what could not be checked
     asked: tuple[str, ...]  # names of the methods asked for; none where they are the program's choice
     # errors of predictions that decide which estimate is chosen; empty where nothing was to be decided
     compared: tuple[HeldOut, ...]
