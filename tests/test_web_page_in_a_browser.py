@@ -97,6 +97,17 @@ def eventually(page, claim, what: str) -> None:
     raise AssertionError(what)
 
 
+def draw_zone(page, box, press) -> None:
+    """A square by its corners and the first one again, each pressed when the chart has taken the one before."""
+    page.locator(".leaflet-draw-tooltip").first.wait_for()  # the chart is ready to draw
+    corners = [(0.45, 0.2), (0.6, 0.2), (0.6, 0.35), (0.45, 0.35)]
+    taken = page.locator(".leaflet-editing-icon")
+    for count, (right, down) in enumerate([*corners, corners[0]]):
+        eventually(page, lambda count=count: taken.count() == count, f"the chart has {count} corners")
+        page.wait_for_timeout(300)  # two presses in short sequence are a double click
+        press(box["x"] + right * box["width"], box["y"] + down * box["height"])
+
+
 def drag(page, title: str, east_px: float, north_px: float) -> None:
     mark = page.get_by_title(title, exact=True).bounding_box()
     x, y = mark["x"] + mark["width"] / 2, mark["y"] + mark["height"] / 2
@@ -113,13 +124,14 @@ def test_a_zone_is_drawn_named_and_undone_and_the_start_is_moved_and_turned(page
     box = chart(page)
     page.get_by_text("can be planned in").wait_for()
     page.get_by_role("button", name="Draw a no-go zone").click()
-    corners = [(0.45, 0.2), (0.6, 0.2), (0.6, 0.35), (0.45, 0.35)]
-    for right, down in [*corners, corners[0]]:
-        page.mouse.move(box["x"] + right * box["width"], box["y"] + down * box["height"])
+
+    def press(x: float, y: float) -> None:
+        page.mouse.move(x, y)
         page.wait_for_timeout(100)
         page.mouse.down()
         page.mouse.up()
-        page.wait_for_timeout(100)
+
+    draw_zone(page, box, press)
     eventually(page, lambda: "no_go" in tables(area), "the zone is in the area file")
     page.get_by_text("+ [[no_go]]").wait_for()
     polygon = tables(area)["no_go"][0]["polygon"]
@@ -159,11 +171,7 @@ def test_a_finger_draws_a_zone_and_then_moves_the_start(browser, address: str, f
     tablet.goto("/sea")
     box = chart(tablet)
     tablet.get_by_role("button", name="Draw a no-go zone").tap()
-    tablet.locator(".leaflet-draw-tooltip").first.wait_for()  # the chart is ready to draw
-    corners = [(0.45, 0.2), (0.6, 0.2), (0.6, 0.35), (0.45, 0.35)]
-    for right, down in [*corners, corners[0]]:
-        tablet.touchscreen.tap(box["x"] + right * box["width"], box["y"] + down * box["height"])
-        tablet.wait_for_timeout(300)
+    draw_zone(tablet, box, tablet.touchscreen.tap)
     eventually(tablet, lambda: "no_go" in tables(area), "the zone is in the area file")
     tablet.wait_for_timeout(500)
     finger = context.new_cdp_session(tablet)
