@@ -23,7 +23,7 @@ from expdesign.importing.mapping import (
     counted,
     dimension,
 )
-from expdesign.importing.names import COURSE_OR_HEADING, Mark, family_of, marked, numbered
+from expdesign.importing.names import COURSE_OR_HEADING, ORDER, Mark, family_of, marked, numbered
 from expdesign.values import Array
 from expdesign.vessel import Actuator
 
@@ -113,6 +113,17 @@ NEAR_RAD = 0.5  # median by which heading and course, magnetic and true, differ 
 
 
 def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]) -> Use:
+    """The use of a channel, with its unit and sense: a rate's by the heading, any other by what its name says."""
+    use = _in_unit(channel, mark, channels, chosen)
+    if mark.sense >= 0.0 or not use.column:
+        return use
+    ratio = _turning(channel, channels, chosen) if use.column == "r_radps" else None
+    if ratio is not None and ratio.explained >= FIT:
+        return use
+    return replace(use, scale=-use.scale, why=f"{use.why}; port is positive by its name: {SENSE}")
+
+
+def _in_unit(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]) -> Use:
     """The use of a channel, with its unit."""
     use = Use(file=channel.source, channel=channel.name, column=mark.column, unit=mark.unit, why="its name")
     if mark.exact:
@@ -429,5 +440,7 @@ def _unused(channel: Channel, mark: Mark, chosen: dict[tuple[str, ...], Channel]
     better = chosen.get(mark.key)
     instead = {MAGNETIC: "the true heading", "north_m": "latitude", "east_m": "longitude"}.get(mark.column, "")
     why = f"{better.name} is used" if better is not None else "no quantity that is read"
+    if not mark.is_actuator and re.search(ORDER, mark.name):
+        why = "an order by its name, no reading"
     why = f"{instead} is used" if instead and better is None else why
     return Use(file=channel.source, channel=channel.name, why=why)

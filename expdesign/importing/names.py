@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.importing.channels import Channel
+from expdesign.importing.languages import split_sense, words
 from expdesign.importing.mapping import (
     COG,
     EASTWARD,
@@ -24,7 +25,6 @@ from expdesign.importing.mapping import (
     dimension,
     split_unit,
     unit_word,
-    words,
 )
 from expdesign.records.file import Source, is_input, meaning
 from expdesign.values import Array
@@ -35,6 +35,10 @@ COURSE_OR_HEADING = 3
 RULES = (
     ("", 0, r"\b(des|desired|nav|target|tgt|wp|std|sigma|var|cov|err(or)?|quality|id|temp|volt\w*|curr\w*)\b"),
     ("", 0, r"\b(buoy|mark|waypoint|pin|committee|ais)\b"),
+    ("", 0, r"\b(limit\w*|mode|modus|alarm\w*|max|maximum|minimum|cts|to steer)\b"),
+    ("", 0, r"\b(turbo\w*|t c|generator|dg|alternator|pump\w*|fan|blower|compressor)\b"),
+    ("", 0, r"\b(bow|stern|lateral|transvers\w*) (speed|spd)\b"),
+    ("", 0, r"^(em |doppler |speed )?log( speed| spd)?$"),
     ("", 0, r"\b(water|stw|longwaterspd|transwaterspd|true wind|tws|twd|twa|mwd)\b"),
     ("wind_angle_rad", 0, r"\bawa\b|mwv angle r\b|(rel\w*|app\w*|vane)?.*wind (angle|dir\w*)"),
     ("wind_speed_mps", 0, r"\baws\b|mwv speed r\b|(rel\w*|app\w*)?.*wind (speed|spd)"),
@@ -84,6 +88,8 @@ RULES = (
 first column of all, "", is of what is no measurement of the ship's own motion."""
 ACTUATORS = ("rudder", "a", "n", "throttle")
 ACTUATOR_RULES = tuple(rule for rule in RULES if rule[0] in ACTUATORS)
+SIDED = (*ACTUATORS, "r_radps", "roll_rad", "roll_rate_radps", "v_mps", "imu_lateral_mps2", "wind_angle_rad")
+"""What is to one side or the other."""
 ORDER = r"\b(order\w*|cmd|command\w*|set|setpoint|sp|demand|dem|req\w*|desired|des|ref|target|tgt|wanted)\b"
 REACHED = r"\b(act|actual|fb|fbk|feedback|meas\w*|resp\w*|rsa|reached|pos|position)\b"
 PORT, STARBOARD = r"\b(p|port|portangle|ps|bb|left|l)\b", r"\b(s|stbd|stbdangle|sb|starboard|stb|right|r)\b"
@@ -103,6 +109,7 @@ class Mark:
     unit: str = ""
     name: str = ""  # in words
     exact: bool = False  # whether the name is one of ours
+    sense: float = 0.0  # -1 where the name says that port is positive, 1 for starboard, 0 for nothing
 
     @property
     def machine(self) -> tuple[str, str, str]:
@@ -137,31 +144,34 @@ def marked(channel: Channel) -> Mark:
     own = meaning(channel.name, 0)
     if isinstance(own, Source) and not (is_input(own.name) and not re.search(r"\d|tau", channel.name)):
         return Mark(column=own.name, rank=-1, unit=f"times {own.factor!r}", exact=True, name=words(channel.name))
-    bare, unit = split_unit(channel.name)
+    plain, sense = split_sense(channel.name)
+    bare, unit = split_unit(plain)
     name, unit = words(bare), channel.unit or unit
     if channel.unit and unit_word(channel.unit) not in {u for t in FACTORS.values() for u in t} | set(SHARES):
         unit = ""
     talker = re.match(r"([A-Z]{2})([A-Z]{3})\.", channel.name)
     if talker:  # the sentence without who talks
         name = words(f"{talker[2]}.{bare[6:]}")
-    whole = words(channel.name) if bare != channel.name else name
+    whole = words(plain) if bare != plain else name
     column, rank = _rule(name, RULES) or _rule(whole, RULES) or ("", 9)
     if column == "" and re.search(ORDER, name):
         column, rank = _rule(whole, ACTUATOR_RULES) or ("", 9)
     if name in ("x", "y", "z"):
         column, rank = _coordinate(name, channel.values), 4
-    if not _fits(column, unit_word(unit)):
-        column = ""
+    if not _fits(column, unit_word(unit)) or (column not in ACTUATORS and re.search(ORDER, name)):
+        column = ""  # an order of a heading or a speed is no reading of it
     if column in BESIDE and np.ptp(channel.values) == 0:
         column = ""
-    return Mark(column=column, rank=rank, unit=unit_word(unit), name=name)
+    return Mark(column=column, rank=rank, unit=unit_word(unit), name=name, sense=sense if column in SIDED else 0.0)
 
 
 def _fits(column: str, unit: str) -> bool:
     """Whether a column can be in a unit that is stated: a speed in knots is no number of revolutions."""
     kind = {"rudder": "angle", "a": "angle", "n": "revolutions"}.get(column)
-    if not column or not unit or column == "throttle" or (kind and unit in SHARES):
+    if not column or not unit or (kind and unit in SHARES):
         return True
+    if column == "throttle":  # a lever or revolutions, no force and no angle
+        return unit in SHARES or unit in FACTORS["revolutions"] or unit not in KNOWN
     return unit in FACTORS[kind or dimension(column)] or unit not in KNOWN
 
 
@@ -298,7 +308,7 @@ def bow_signals(mapping: Mapping) -> tuple[str, ...]:
     return tuple(
         use.column.removeprefix("reached_").removesuffix("_rps")
         for use in mapping.uses
-        if re.search(BOW, words(use.channel)) and use.column.endswith("_rps")
+        if re.search(BOW, words(split_sense(use.channel)[0])) and use.column.endswith("_rps")
     )
 
 
@@ -307,7 +317,7 @@ def sides(mapping: Mapping) -> dict[str, float]:
     found: dict[str, float] = {}
     for use in mapping.uses:
         if use.column.endswith("_rps"):
-            name, signal = words(use.channel), use.column.removeprefix("reached_").removesuffix("_rps")
+            name, signal = words(split_sense(use.channel)[0]), use.column.removeprefix("reached_").removesuffix("_rps")
             side = -1.0 if re.search(PORT, name) else 1.0 if re.search(STARBOARD, name) else 0.0
             found |= {signal: side} if side else {}
     return found

@@ -10,7 +10,8 @@ from datetime import date
 import numpy as np
 
 from expdesign.importing.channels import COMPUTER, DAY_S, GNSS, NONE, OWN
-from expdesign.importing.mapping import split_unit, words
+from expdesign.importing.languages import words
+from expdesign.importing.mapping import split_unit
 from expdesign.values import Array
 
 STAMP = re.compile(

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.importing.mapping import KNOWN, is_foreign, split_unit, unit_word, words
+from expdesign.importing.languages import is_foreign, words
+from expdesign.importing.mapping import KNOWN, split_unit, unit_word
 from expdesign.importing.times import read_stamps
 from expdesign.records.file import MISSING
 from expdesign.values import Array

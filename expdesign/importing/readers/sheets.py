@@ -16,7 +16,8 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.importing.channels import COMPUTER, GNSS, MOST_NUMBERS, NONE, OWN, Log, channels_of, check_size
-from expdesign.importing.mapping import split_unit, words
+from expdesign.importing.languages import words
+from expdesign.importing.mapping import split_unit
 from expdesign.importing.readers.text import read_text
 from expdesign.importing.times import TIME_NAME, Clock, clock_of, read_stamps
 

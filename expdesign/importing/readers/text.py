@@ -17,7 +17,8 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.importing.channels import COMPUTER, DAY_S, GNSS, NONE, OWN, Blocks, Log, channels_of, spread
-from expdesign.importing.mapping import counted, words
+from expdesign.importing.languages import words
+from expdesign.importing.mapping import counted
 from expdesign.importing.readers.dialect import (
     SEPARATORS,
     Dialect,
