@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess
-from expdesign.assessment.held_out import Ahead, HeldOut, by_run, certainly_worse, folds, ranked, reason, stay_bounded
+from expdesign.assessment.ahead import Ahead, by_run
+from expdesign.assessment.held_out import HeldOut, certainly_worse, folds, ranked, reason, stay_bounded
 from expdesign.cli import main
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named

@@ -3,7 +3,9 @@
 The ship is that of the bridge log. Her orders are given ten times a second, and read once a second.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,9 @@ import pytest
 
 from expdesign.assessment import Assessment, EstimateOptions, assess, settled, with_unstated
 from expdesign.assessment.unstated import _surest
+from expdesign.errors import Diverged
+from expdesign.estimation.methods import Method
+from expdesign.estimation.output_error import ActuatorTime
 from expdesign.export.estimate_page import answer_sentence, current_sentence
 from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
@@ -59,9 +64,10 @@ def run(
     return Record(batches=(batch,))
 
 
-def found(raw: Record, ship: Vessel = SHIP) -> Assessment:
-    """Output error, and what it shows beside."""
-    return with_unstated(ship, raw, OPTIONS, assess(ship, reduced(raw, ship), OPTIONS))
+def found(raw: Record, ship: Vessel = SHIP, *, methods: tuple[str, ...] = ("oe",)) -> Assessment:
+    """Estimates, of output error unless told otherwise, and what it shows beside."""
+    options = replace(OPTIONS, methods=methods)
+    return with_unstated(ship, raw, options, assess(ship, reduced(raw, ship), options))
 
 
 def surprise(told: Assessment) -> float:
@@ -103,6 +109,42 @@ def test_what_nobody_stated_is_told_with_its_size(kind: str) -> None:
     assert np.hypot(told.current.north_mps - north, told.current.east_mps - east) < 5 * told.current.std_mps
     toward = np.degrees(np.arctan2(told.current.east_mps, told.current.north_mps)) % 360
     assert f"towards {toward:.0f} deg" in current_sentence(told.current)
+
+
+@pytest.mark.parametrize("methods", [("ls",), pytest.param(("ls", "iv"), marks=pytest.mark.thorough)])
+def test_other_methods_are_biased_alike_and_tell_the_same(methods: tuple[str, ...]) -> None:
+    told = found(run(1, helm_later_s=0.4), methods=methods)
+    assert surprise(told) > 5
+    (answer,) = told.answers
+    assert answer.signal == "rudder1"
+    assert abs(answer.late_s - (0.4 - FINE_S * ROW)) < 4 * answer.std_s
+    assert told.current is None
+
+
+def test_what_could_not_be_asked_is_told_and_the_rest_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    assessing = import_module("expdesign.assessment.assess")
+    raw, attempted = run(1, current_to=(0.3, -0.4)), assessing.attempted
+    options = replace(OPTIONS, methods=("ls",))
+    done = assess(SHIP, reduced(raw, SHIP), options)
+
+    def told(fails: Callable[[Method, tuple[ActuatorTime, ...]], bool]) -> Assessment:
+        def attempt(work, ship, record, method, **given):
+            if fails(method, given.get("times", ())):
+                raise Diverged("it ran away")
+            return attempted(work, ship, record, method, **given)
+
+        monkeypatch.setattr(assessing, "attempted", attempt)
+        return with_unstated(SHIP, raw, options, done)
+
+    no_current = told(lambda method, times: method.weather.steady)
+    assert no_current.notes == ("Whether there is a current that nobody stated is not known: it ran away.",)
+    assert no_current.current is None
+    no_answers = told(lambda method, times: bool(times))
+    assert no_answers.notes == ("Whether inputs are answered when the vessel file says is not known: it ran away.",)
+    assert no_answers.current is not None
+    neither = told(lambda method, times: True)
+    assert neither.notes == ("Whether there is a current or a dead time that nobody stated is not known: it ran away.",)
+    assert neither.best.estimate is done.best.estimate
 
 
 @pytest.mark.thorough

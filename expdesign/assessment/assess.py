@@ -16,7 +16,7 @@ from expdesign.assessment.actuator_times import (
     with_times_noted,
 )
 from expdesign.assessment.held_out import HeldOut, ranked
-from expdesign.assessment.misfit import ESTIMATION, TEST, Limits, check_run, decomposed, one_step
+from expdesign.assessment.misfit import AHEAD_S, ESTIMATION, TEST, Limits, check_run, decomposed, one_step
 from expdesign.assessment.trials import (
     Trial,
     Work,
@@ -175,7 +175,9 @@ def assess(
 def with_unstated(
     vessel: Vessel, raw: Record, options: EstimateOptions, found: Assessment, *, smoothed: bool = False
 ) -> Assessment:
-    """An assessment with the current and the answers to inputs that nobody stated, as its output error shows them.
+    """An assessment with the current and the answers to inputs that nobody stated, as output error shows them.
+
+    Where none is among its methods, one is made for this: what nobody stated passes into the other estimates as well.
 
     Args:
         vessel: as in `assess`.
@@ -184,10 +186,16 @@ def with_unstated(
         found: its result.
         smoothed: as in `settled`.
     """
-    own = next((item for item in (found.best, *found.methods) if item.method.solver == "oe"), None)
-    if own is None or options.motion != CONTINUOUS:
+    if options.motion != CONTINUOUS:
         return found
-    method, held, flow, notes = own.method, own.estimate, None, list(found.notes)
+    try:
+        own = _output_error_of(vessel, options, found)
+    except (InputError, NoAnswer, np.linalg.LinAlgError) as error:
+        note = f"Whether there is a current or a dead time that nobody stated is not known: {error}."
+        return replace(found, notes=(*found.notes, note))
+    if own is None:
+        return found
+    method, held, flow, notes = own.method, own.found, None, list(found.notes)
 
     def again(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
         work = Work(vessel=ship, stated=ship, record=record, options=replace(options, horizon_s=own.horizon_s))
@@ -209,6 +217,25 @@ def with_unstated(
         late = ()
         notes.append(f"Whether inputs are answered when the vessel file says is not known: {error}.")
     return replace(found, current=flow, answers=late, notes=tuple(notes))
+
+
+def _output_error_of(vessel: Vessel, options: EstimateOptions, found: Assessment) -> Trial | None:
+    """Output error of an assessment, the chosen one first; else one made in the same weather, if data are not too long.
+
+    Raises:
+        InputError, NoAnswer: there is no such estimate.
+    """
+    item = next((item for item in (found.best, *found.methods) if item.method.solver == "oe"), None)
+    if item is not None:
+        return Trial(method=item.method, horizon_s=item.horizon_s, found=item.estimate, start=item.start)
+    weather, horizon_s = found.best.method.weather, options.horizon_s or AHEAD_S
+    method = method_for("oe", weather.unknown, wind=weather.wind)
+    work = Work(vessel=vessel, stated=vessel, record=found.record, options=replace(options, horizon_s=horizon_s))
+    record = work.seen(found.record)
+    if method is None or sum(map(len, record.batches)) > MOST_BY_ITSELF:
+        return None
+    own = attempted(work, vessel, record, method, times=known_times(vessel, vessel, found.record))
+    return Trial(method=method, horizon_s=horizon_s, found=own, start="")
 
 
 def _kept(trials: Sequence[Trial], beside: Sequence[Trial], best: Sequence[int]) -> list[Trial]:

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
         recorded_dictionary_json,
         subsets_json,
     )
+    from expdesign.export.files.disturbances import disturbance_table
     from expdesign.export.files.estimates import (
         breach_sentences,
-        disturbance_table,
         estimate_json,
         estimate_values,
         estimated_vessel,

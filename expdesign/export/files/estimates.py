@@ -1,4 +1,4 @@
-"""Estimates as estimate.json, as tables for a terminal, and as a vessel file; with current and wind."""
+"""Estimates as estimate.json, as tables for a terminal, and as a vessel file."""
 
 from __future__ import annotations
 
@@ -11,116 +11,18 @@ from typing import Any
 import numpy as np
 
 from expdesign.assessment import Assessed, Assessment, Limits, RunCheck, sentence
-from expdesign.assessment.held_out import LARGEST_ERROR, ranked
+from expdesign.assessment.ahead import LARGEST_ERROR
+from expdesign.assessment.held_out import ranked
 from expdesign.assessment.misfit import AHEAD_S, ESTIMATION, TEST
 from expdesign.conventions import plus_minus
-from expdesign.estimation.disturbance import MeasuredWind, Moments
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
 from expdesign.export import words
 from expdesign.export.document import Table
-from expdesign.export.files.text import finite, named_finite, strict_json
+from expdesign.export.files.disturbances import disturbance_entries
+from expdesign.export.files.text import finite, named_finite, strict_json, valued
 from expdesign.export.files.vessel_file import vessel_toml
-from expdesign.values import Array
 from expdesign.vessel import Vessel
-
-CURRENT = "velocity of the water over ground"
-WIND = "velocity of the air over ground, measured; the covariance is that of its samples, with the sensors' noise"
-CONSTANT = "second moments: the current is estimated as steady"
-TOGETHER = "second moments: drag terms of water and air are estimated together"
-DIRECTIONS = ("north", "east")
-SECOND = ("north_squared_less_east_squared", "north_times_east")
-CENTRAL = ("variance_north_less_east", "covariance_north_east")
-UNSEEN = "the sum of both squares, a constant in the equations that instruments without mean do not see"
-HEADER = (
-    "method",
-    "of",
-    "mean to north, east [m/s]",
-    "mean of N N - E E, N E [m2/s2]",
-    "var N - var E, cov N E [m2/s2]",
-)
-
-
-def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
-    """One entry for each disturbance that a method estimates; empty where it estimates none."""
-    found = item.disturbances
-    steady = item.method.weather.steady
-    entries = [_moments_entry(own, steady=steady) for own in _moments_of(item)]
-    return [*entries, *([] if found.wind is None else [_wind_entry(found.wind)])]
-
-
-def disturbance_table(found: Assessment) -> Table:
-    """A row for each disturbance that a method estimates."""
-    rows = []
-    for item in found.methods:
-        for own in _moments_of(item):
-            std = own.covariance.diagonal() ** 0.5
-            cells = [_pair(part, std[2 * n : 2 * n + 2]) for n, part in enumerate((own.mean, own.second, own.central))]
-            rows.append((item.method.name, _short(own), *cells))
-        wind = item.disturbances.wind
-        if wind is not None:
-            (nn, ne), (_, ee) = wind.covariance.tolist()
-            square = wind.mean[0] ** 2 - wind.mean[1] ** 2, wind.mean[0] * wind.mean[1]
-            values = [wind.mean.tolist(), (nn - ee + square[0], ne + square[1]), (nn - ee, ne)]
-            rows.append(
-                (
-                    item.method.name,
-                    "air, as measured",
-                    *(", ".join(f"{value:.3g}" for value in pair) for pair in values),
-                )
-            )
-    return Table(header=HEADER, rows=rows, texts=3)
-
-
-def meaning(own: Moments) -> str:
-    """What the moments are of."""
-    if own.of == "current":
-        return CURRENT
-    (air, water) = own.shares[0]
-    return (
-        f"velocity over ground of wind and current combined, as {water} acts on them in d{own.of}/dt: the wind by the "
-        f"share of {air} in the sum of both parameters, the current by that of {water}"
-    )
-
-
-def _short(own: Moments) -> str:
-    return "water" if own.of == "current" else f"water and air combined, in {own.shares[0][1]}"
-
-
-def _moments_of(item: Assessed) -> tuple[Moments, ...]:
-    found = item.disturbances
-    return (*(() if found.current is None else (found.current,)), *found.combined)
-
-
-def _moments_entry(own: Moments, *, steady: bool) -> dict[str, Any]:
-    std = own.covariance.diagonal() ** 0.5
-    seen = bool(np.isfinite(own.second).all())
-    return {
-        "of": "current" if own.of == "current" else f"current and wind in d{own.of}/dt",
-        "meaning": meaning(own),
-        "mean_mps": _valued(DIRECTIONS, own.mean, std[:2]),
-        "second_moments_m2ps2": _valued(SECOND, own.second, std[2:4]) if seen else None,
-        "covariance_m2ps2": _valued(CENTRAL, own.central, std[4:]) if seen else None,
-        "not_told": UNSEEN if seen else (CONSTANT if steady else TOGETHER),
-    }
-
-
-def _wind_entry(wind: MeasuredWind) -> dict[str, Any]:
-    (nn, ne), (_, ee) = wind.covariance.tolist()
-    return {
-        "of": "wind",
-        "meaning": WIND,
-        "mean_mps": dict(zip(DIRECTIONS, wind.mean.tolist(), strict=True)),
-        "covariance_m2ps2": {"north_north": nn, "north_east": ne, "east_east": ee},
-        "samples": wind.samples,
-    }
-
-
-def _pair(values: Array, stds: Array) -> str:
-    if not np.isfinite(values).all():
-        return "not told"
-    return ", ".join(plus_minus(value, std) for value, std in zip(values.tolist(), stds.tolist(), strict=True))
-
 
 # Estimates in words: tables for a terminal, and warnings.
 
@@ -276,7 +178,7 @@ def _shared_entry(found: Assessment, item: Assessed) -> dict[str, Any]:
     """What both say of a method."""
     steered = item.estimate.steered
     return {
-        "parameters": _valued(item.estimate.names, item.estimate.values, item.estimate.std),
+        "parameters": valued(item.estimate.names, item.estimate.values, item.estimate.std),
         "horizon_s": item.horizon_s,
         # label of method and horizon -> errors of predictions of what was left out, over standard deviations
         "predictions": {
@@ -299,7 +201,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         "title": item.method.title,
         "parameters": shared["parameters"],
         "held": dict(estimate.held),
-        "nuisance": _valued(
+        "nuisance": valued(
             estimate.nuisance_names,
             estimate.nuisance_values,
             estimate.joint_covariance.diagonal()[-q:] ** 0.5 if q else estimate.nuisance_values,
@@ -421,7 +323,7 @@ def _current(item: Assessed) -> dict[str, Any] | None:
     current = item.disturbances.current
     if current is None:
         return None
-    return _valued(("north_mps", "east_mps"), current.mean, current.covariance.diagonal()[:2] ** 0.5)
+    return valued(("north_mps", "east_mps"), current.mean, current.covariance.diagonal()[:2] ** 0.5)
 
 
 def _data(found: Assessment) -> dict[str, Any]:
@@ -451,8 +353,3 @@ def _breach(breach: Breach) -> dict[str, Any]:
         "of": breach.count,
         "sentence": str(breach),
     }
-
-
-def _valued(names: Sequence[str], values: Array, stds: Array) -> dict[str, Any]:
-    pairs = zip(names, values.tolist(), stds.tolist(), strict=True)
-    return {name: {"value": finite(value), "std": finite(std)} for name, value, std in pairs}

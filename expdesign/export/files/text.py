@@ -49,6 +49,12 @@ def named_finite(names: Sequence[str], values: Array) -> dict[str, float | None]
     return {name: finite(value) for name, value in zip(names, values.tolist(), strict=True)}
 
 
+def valued(names: Sequence[str], values: Array, stds: Array) -> dict[str, dict[str, float | None]]:
+    """Name -> value and standard deviation, null where they are not finite."""
+    pairs = zip(names, values.tolist(), stds.tolist(), strict=True)
+    return {name: {"value": finite(value), "std": finite(std)} for name, value, std in pairs}
+
+
 def finite(value: float) -> float | None:
     """The value, or None (null) where it is not a number."""
     return float(value) if math.isfinite(value) else None
