@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegWater
 from expdesign.scenario import load_vessel

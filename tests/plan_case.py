@@ -10,8 +10,7 @@ import shapely
 
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.plan import PlanSettings
-from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.chart.goal_distance import build_goal_distance
+from expdesign.plan.chart.goal_distance import build_goal_distance, clearance_field
 from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.local_planner import SearchSpace, local_planner

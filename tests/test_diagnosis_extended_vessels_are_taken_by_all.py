@@ -20,7 +20,7 @@ from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.regression.tables import model_for, with_depth
+from expdesign.estimation.regression.regression import model_for, with_depth
 from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.export.diagnosis_page import diagnosis_document
 from expdesign.export.diagnosis_results import extended_vessel

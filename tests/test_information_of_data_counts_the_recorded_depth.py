@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
-from expdesign.estimation.regression.tables import with_depth
+from expdesign.estimation.regression.regression import with_depth
 from expdesign.information.recorded import recorded_information
 from expdesign.signals import Record
 from expdesign.simulation import CALM

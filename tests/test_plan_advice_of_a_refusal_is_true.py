@@ -22,11 +22,10 @@ from expdesign.plan.legs import LegWater, escapes
 from expdesign.plan.legs.water import check_ends
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.local_planner.agile import AgilePlanner
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import REMEDY_WORK, REPLANS, advised
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.values import WorkBudget
+from expdesign.plan.values import PlanProblem, WorkBudget
 from expdesign.progress import silent
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment

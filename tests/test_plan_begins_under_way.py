@@ -14,9 +14,8 @@ from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.bounds import reposition_bound_s
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial
-from expdesign.plan.values import UnderWay
+from expdesign.plan.values import PlanProblem, UnderWay
 from expdesign.plan.verify import verify_plan
 from expdesign.scenario import load_scenario
 from expdesign.simulation import Environment, simulate, to_body

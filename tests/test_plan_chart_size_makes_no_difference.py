@@ -12,9 +12,9 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.assembly import ship_on_legs, waters
 from expdesign.plan.chart import connects, reachable, resolved
-from expdesign.plan.chart.clearance_grid import grid_cell_m
-from expdesign.plan.problem import PlanProblem
+from expdesign.plan.chart.goal_distance import grid_cell_m
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.values import PlanProblem
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
 from plan_case import area

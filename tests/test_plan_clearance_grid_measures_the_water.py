@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.chart.clearance_grid import clearance_field, narrowest_passage
+from expdesign.plan.chart.goal_distance import clearance_field, narrowest_passage
 from plan_case import area
 
 

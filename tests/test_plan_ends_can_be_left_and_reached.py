@@ -11,7 +11,7 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
-from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.legs.water import check_ends, escapes

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs._ompl import dubins_curve

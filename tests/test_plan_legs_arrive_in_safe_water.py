@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask, LegWater, _ompl, agile, agile_leg, dubins
 from expdesign.plan.legs._ompl import SEARCH_BATCHES, dubins_curve, search_dubins

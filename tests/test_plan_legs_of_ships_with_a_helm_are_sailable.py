@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.chart.clearance_grid import clearance_field
+from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.control import APPROACH_HULLS
 from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask, LegWater

@@ -6,8 +6,8 @@ import pytest
 import shapely
 
 from expdesign import workflows
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.values import PlanProblem
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
 from short_examples import SHORTER, copied, example_run

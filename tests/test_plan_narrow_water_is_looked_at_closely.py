@@ -13,7 +13,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.assembly import leg_water, plan_room, roomy_water, ship_on_legs, waters
 from expdesign.plan.feasibility import place_of
-from expdesign.plan.problem import PlanProblem
+from expdesign.plan.values import PlanProblem
 from expdesign.progress import silent
 from expdesign.simulation import CALM
 from expdesign.vessel.vessel import covering_discs

@@ -18,8 +18,8 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings, solve
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.values import PlanProblem
 from expdesign.simulation import Environment
 from plan_case import acceleration, area, place_in, ship
 

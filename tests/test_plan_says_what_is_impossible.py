@@ -12,8 +12,8 @@ import shapely
 from expdesign.dictionary import PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.errors import NoPlan, Unreachable
 from expdesign.plan import PlanSettings
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.values import PlanProblem
 from expdesign.simulation import CALM, Environment
 from plan_case import acceleration, area, place_in, ship
 

@@ -9,8 +9,13 @@ import pytest
 import shapely
 
 from expdesign.plan.chart import visibility_graph
-from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.chart.goal_distance import build_goal_distance, first_bends, shortest_path_tree, taut_bends
+from expdesign.plan.chart.goal_distance import (
+    build_goal_distance,
+    clearance_field,
+    first_bends,
+    shortest_path_tree,
+    taut_bends,
+)
 from expdesign.plan.chart.visibility_graph import (
     VisibilityGraph,
     build_visibility_graph,

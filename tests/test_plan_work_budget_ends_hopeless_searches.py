@@ -14,9 +14,8 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.legs import LegTask
 from expdesign.plan.local_planner import TransitionTrials
 from expdesign.plan.local_planner.agile import AgilePlanner
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial, plan_trial
-from expdesign.plan.values import WorkBudget
+from expdesign.plan.values import PlanProblem, WorkBudget
 from expdesign.simulation import CALM
 from plan_case import acceleration, area, at_rest, find_leg, leg_water, primitive, ship, space_of
 

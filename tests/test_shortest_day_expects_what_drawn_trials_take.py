@@ -14,8 +14,8 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.checked import LATENESS_TRIALS, drawn_lateness_s
 from expdesign.plan.control import capability
 from expdesign.plan.monte_carlo import sail_trials
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial
+from expdesign.plan.values import PlanProblem
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day.prices import LEAST_LEG_S, DraftedDay, _legs_s
 from expdesign.simulation import Environment

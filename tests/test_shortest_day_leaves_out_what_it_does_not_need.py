@@ -8,9 +8,8 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial, redrafted
-from expdesign.plan.values import Leg, Placement
+from expdesign.plan.values import Leg, Placement, PlanProblem
 from expdesign.progress import silent
 from expdesign.shortest_day.drafting import Drafting
 from expdesign.shortest_day.prices import DraftedDay

@@ -7,10 +7,9 @@ import pytest
 
 from expdesign.export.step_trial_content import SIGNIFICANT
 from expdesign.step_trials.holds import Hold
-from expdesign.step_trials.regression import Sampled, ridge
 from expdesign.step_trials.responses import Transient, first_order, fit_first_order
 from expdesign.step_trials.samples import Plateau, StepSample
-from expdesign.step_trials.surfaces import Comparison, comparisons
+from expdesign.step_trials.surfaces import Comparison, Sampled, comparisons, ridge
 
 CONSTANT_S = 4.0
 

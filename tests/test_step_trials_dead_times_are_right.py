@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.step_trials.dead_times import dead_time, turn_entry
 from expdesign.step_trials.holds import Hold, Sailed
+from expdesign.step_trials.identify import dead_time, turn_entry
 from expdesign.step_trials.responses import Transient, fit_first_order, second_order, shared_delay
 from expdesign.step_trials.samples import Plateau, StepSample
 

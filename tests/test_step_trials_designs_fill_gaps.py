@@ -16,7 +16,7 @@ from design_case import spec
 from expdesign.dictionary import build_primitive
 from expdesign.scenario import load_vessel
 from expdesign.simulation import simulate
-from expdesign.step_trials.regression import Sampled, ridge
+from expdesign.step_trials.surfaces import Sampled, ridge
 from expdesign.vessel import Vessel
 from expdesign.vessel.structures import Term
 from step_case import GUESS

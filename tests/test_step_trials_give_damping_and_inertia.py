@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from expdesign.step_trials.holds import Sailed
-from expdesign.step_trials.regression import Sampled, lasso, ridge
 from expdesign.step_trials.responses import (
     Transient,
     first_order,
@@ -16,7 +15,7 @@ from expdesign.step_trials.responses import (
     second_order,
 )
 from expdesign.step_trials.samples import modified_scores, plateau
-from expdesign.step_trials.surfaces import EVEN, ODD, fitted_surface, validity_region
+from expdesign.step_trials.surfaces import EVEN, ODD, Sampled, fitted_surface, lasso, ridge, validity_region
 
 FINE_S = 0.02
 

@@ -34,10 +34,9 @@ from expdesign.plan.local_planner import (
     local_planner,
     pairs_of,
 )
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs
-from expdesign.plan.values import WorkBudget
+from expdesign.plan.values import PlanProblem, WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment

@@ -18,8 +18,7 @@ from expdesign.plan.monte_carlo import (
     trials_needed,
     worst_leg,
 )
-from expdesign.plan.problem import PlanProblem
-from expdesign.plan.values import RiskEstimate, SailedTrial, Verification, WorkBudget
+from expdesign.plan.values import PlanProblem, RiskEstimate, SailedTrial, Verification, WorkBudget
 from expdesign.plan.verify import verify_plan
 from expdesign.progress import Progress, silent
 from expdesign.values import Array

@@ -16,9 +16,8 @@ import numpy as np
 from expdesign.errors import NoPlan, NoRoom
 from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.local_planner import LocalPlanner, RunSpace, moved
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import have_room
-from expdesign.plan.values import WorkBudget
+from expdesign.plan.values import PlanProblem, WorkBudget
 from expdesign.values import Array
 
 # places and headings at which a run is tried first, before boxes round them are halved

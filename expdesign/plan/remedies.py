@@ -21,7 +21,6 @@ from expdesign.plan.assembly import dispersions, footprints, leg_water, run_spac
 from expdesign.plan.checked import Refused, accepted, promising, verified
 from expdesign.plan.legs import LegWater, escapes
 from expdesign.plan.local_planner import RunSpace
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedy_changes import (
     ACCEPTED,
     NONE,
@@ -43,7 +42,7 @@ from expdesign.plan.remedy_changes import (
     with_settings,
     without_place,
 )
-from expdesign.plan.values import WorkBudget
+from expdesign.plan.values import PlanProblem, WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
 

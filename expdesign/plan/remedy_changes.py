@@ -22,11 +22,10 @@ from expdesign.plan.assembly import (
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater
 from expdesign.plan.local_planner import Departure, RunSpace, local_planner
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.search import place_runs
-from expdesign.plan.values import SailedTrial, WorkBudget
+from expdesign.plan.values import PlanProblem, SailedTrial, WorkBudget
 from expdesign.progress import silent
 
 MOST_SEARCHES = 8  # narrow searches for places, each with a quarter of the partial plans, to check remedies

@@ -21,9 +21,8 @@ from expdesign.plan.assembly import PlanRoom, phases_of
 from expdesign.plan.feasibility import LEG_S
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_state, nearest_turns
 from expdesign.plan.local_planner import Departure, LocalPlanner, SearchSpace
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import placed_runs
-from expdesign.plan.values import Leg, Placement, Placements, PlanSettings, SailedTrial, WorkBudget
+from expdesign.plan.values import Leg, Placement, Placements, PlanProblem, PlanSettings, SailedTrial, WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array

@@ -42,11 +42,10 @@ from expdesign.plan.monte_carlo import (
     violates_chance_constraint,
     worst_leg,
 )
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import REPLANS, advised
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import KnownLegs, sail_all, sail_placed
-from expdesign.plan.values import Leg, Placement, Plan, RiskEstimate, SailedTrial, Verification, WorkBudget
+from expdesign.plan.values import Leg, Placement, Plan, PlanProblem, RiskEstimate, SailedTrial, Verification, WorkBudget
 from expdesign.plan.verify import realised_efficiencies
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea

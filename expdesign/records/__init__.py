@@ -18,7 +18,6 @@ are ignored and noted. Every error is a `FileError` with the rows concerned.
 """
 
 from expdesign.records.file import COLUMNS
-from expdesign.records.levels import read_levels
-from expdesign.records.load import load_records, row_labels
+from expdesign.records.load import load_records, read_levels, row_labels
 from expdesign.records.pieces import STREAM, Piece, Taken, as_file, pieces
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity

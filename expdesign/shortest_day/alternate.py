@@ -14,9 +14,8 @@ from functools import partial
 import numpy as np
 
 from expdesign.errors import NoAnswer, NoPlan, NoRoom
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, plan_drafted, with_advice
-from expdesign.plan.values import Plan, SailedTrial
+from expdesign.plan.values import Plan, PlanProblem, SailedTrial
 from expdesign.processes import in_order
 from expdesign.progress import Progress, in_phases, never_falling, of_part, silent
 from expdesign.shortest_day.accuracy import Accuracy

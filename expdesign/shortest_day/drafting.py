@@ -14,9 +14,8 @@ import numpy as np
 from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NotInformative
 from expdesign.plan.checked import drawn_lateness_s
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, draft_trial, redrafted
-from expdesign.plan.values import Placement, SailedTrial
+from expdesign.plan.values import Placement, PlanProblem, SailedTrial
 from expdesign.plan.verify import expected_errors, track_information
 from expdesign.processes import in_order
 from expdesign.progress import Progress

@@ -30,7 +30,7 @@ from expdesign.growing import (
 )
 from expdesign.memory import recalled
 from expdesign.plan.assembly import ship_on_legs
-from expdesign.plan.problem import PlanProblem
+from expdesign.plan.values import PlanProblem
 from expdesign.progress import Progress, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.cheapest import Relaxed, cheapest_shares, fullest_level

@@ -17,8 +17,8 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.information.disturbed import bordered_runs
 from expdesign.plan.assembly import ship_on_legs
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft
+from expdesign.plan.values import PlanProblem
 from expdesign.signals import Trajectory
 from expdesign.values import Array, seal
 

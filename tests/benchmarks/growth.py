@@ -32,7 +32,7 @@ from expdesign.plan import assembly
 from expdesign.plan.chart import build_goal_distance
 from expdesign.plan.control import Capability
 from expdesign.plan.monte_carlo import estimate_risk
-from expdesign.plan.problem import PlanProblem
+from expdesign.plan.values import PlanProblem
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.sea_area import LocalFrame
 from expdesign.workflows import plan_problem

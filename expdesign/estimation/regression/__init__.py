@@ -28,17 +28,13 @@ from expdesign.estimation.regression.predictors import (
     room_for,
 )
 from expdesign.estimation.regression.regression import (
+    AIR,
     MEANS,
+    VANE,
     Integers,
     Regression,
-    batch_slices,
-    single_output,
-    subtract_mean,
-)
-from expdesign.estimation.regression.tables import (
-    AIR,
-    VANE,
     Table,
+    batch_slices,
     drive_of,
     drive_width,
     heading_of,
@@ -49,5 +45,7 @@ from expdesign.estimation.regression.tables import (
     model_for,
     parts_of,
     signal_table,
+    single_output,
+    subtract_mean,
     with_depth,
 )

@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.estimation.regression.polynomial import MOVING, Algebra, Polynomial, SignalTable, lift, symbol
-from expdesign.estimation.regression.tables import AIR, Table
+from expdesign.estimation.regression.regression import AIR, Table
 from expdesign.signals import Record
 from expdesign.simulation.motion import rates_over_ground, to_body
 from expdesign.values import Array, seal

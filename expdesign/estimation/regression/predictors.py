@@ -42,8 +42,16 @@ from expdesign.estimation.regression.nuisance import (
     unbiased_value,
 )
 from expdesign.estimation.regression.polynomial import Algebra
-from expdesign.estimation.regression.regression import Integers, Regression
-from expdesign.estimation.regression.tables import AIR, VANE, Table, heading_of, inputs_within, measured_table
+from expdesign.estimation.regression.regression import (
+    AIR,
+    VANE,
+    Integers,
+    Regression,
+    Table,
+    heading_of,
+    inputs_within,
+    measured_table,
+)
 from expdesign.signals import Batch, Record
 from expdesign.simulation.motion import turns_current
 from expdesign.values import Array, closed

@@ -1,18 +1,16 @@
 """The chart for the planner: clearance grid, visibility graph, distance to the goal."""
 
-from expdesign.plan.chart.clearance_grid import (
-    ClearanceField,
-    clearance_field,
-    connects,
-    narrowest_passage,
-    reachable,
-    resolved,
-)
 from expdesign.plan.chart.goal_distance import (
+    ClearanceField,
     GoalDistance,
     build_goal_distance,
+    clearance_field,
+    connects,
     first_bends,
+    narrowest_passage,
     path_over,
+    reachable,
+    resolved,
     shortest_path_tree,
     taut_bends,
 )

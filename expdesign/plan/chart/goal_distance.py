@@ -1,20 +1,213 @@
-"""Distance to the goal round the islands, and the shortest path there, for every point of the water.
+"""Grids over the water: distance to what is forbidden, and distance to the goal round the islands with the path there.
 
-Paths are those of the visibility graph, so the distance prefers no direction; the grid only tabulates it.
+Paths to the goal are those of the visibility graph, so the distance prefers no direction; the grid only tabulates it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
 import shapely
 
-from expdesign.plan.chart.clearance_grid import ClearanceField
 from expdesign.plan.chart.visibility_graph import VisibilityGraph
-from expdesign.values import Array
+from expdesign.sea_area import SeaArea, as_multipolygon
+from expdesign.values import Array, seal
+
+GRID_CELLS = 3_000_000  # of the clearance grid at most; a larger area gets a coarser grid
+FINE_HULLS = 0.25  # spacing of that grid in hull lengths above which a smaller part of the chart is planned in
+KEPT = 0.9  # share of the extent of the water, from which on nothing is left out for being unreachable
+LEAST_REACH_HULLS = 60.0  # hull lengths that this part reaches from start and goal at least
+ROUTING_CELLS = 400_000  # of the grid on which the narrowest passage is located
+KEPT_GRIDS = 3  # visibility graphs, clearance grids and tables of distances that a process keeps
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ClearanceField:
+    """Distance to forbidden water on a grid."""
+
+    origin: Array  # (2,) north, east of the first cell's centre [m]
+    cell_m: float  # grid spacing [m]
+    clearance_m: Array  # (rows north, columns east) distance from the cell's centre to anything forbidden [m]
+
+    def __post_init__(self) -> None:
+        seal(self, origin="2", clearance_m="r c")
+
+    @property
+    def error_m(self) -> float:
+        """A looked-up clearance differs from the true one by less than this [m]."""
+        return 2.0 * self.cell_m  # half a cell's diagonal at the point and at the shore, and half a cell of rounding
+
+    def index(self, points: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Nearest cell's row and column of (..., 2) north/east points; outside the grid they are clipped."""
+        cells = np.rint((points - self.origin) / self.cell_m)
+        rows, columns = self.clearance_m.shape
+        row, column = np.fmax(cells[..., 0], 0.0), np.fmax(cells[..., 1], 0.0)  # quicker than clip for few points
+        return np.fmin(row, rows - 1).astype(np.intp), np.fmin(column, columns - 1).astype(np.intp)
+
+    def at(self, points: Array) -> Array:
+        """(...,) clearance of (..., 2) points; the grid's rim is forbidden, so points outside have none."""
+        rows, columns = self.index(points)
+        return np.asarray(self.clearance_m[rows, columns])
+
+    def thinned(self, cells: int) -> ClearanceField:
+        """Every n-th cell in both directions, so that at most `cells` are left."""
+        step = max(1, int(np.ceil(np.sqrt(self.clearance_m.size / cells))))
+        return ClearanceField(
+            origin=self.origin, cell_m=self.cell_m * step, clearance_m=self.clearance_m[::step, ::step]
+        )
+
+    def centre(self, flat: np.ndarray) -> Array:
+        """(..., 2) north/east of flat cell numbers."""
+        rows, columns = np.divmod(flat, self.clearance_m.shape[1])
+        return self.origin + self.cell_m * np.stack([rows, columns], axis=-1)
+
+
+def grid_cell_m(area: SeaArea, resolution_m: float) -> float:
+    """Spacing of the grid over an area [m]."""
+    west, south, east, north = area.water.bounds
+    return max(resolution_m, float(np.sqrt((east - west) * (north - south) / GRID_CELLS)))
+
+
+def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
+    """Clearance of every cell of a grid over the allowed water, by an exact distance transform.
+
+    Args:
+        area: allowed water.
+        resolution_m: desired spacing; coarser where the area would need more than `GRID_CELLS`.
+    """
+    return _clearance_field(area.water, grid_cell_m(area, resolution_m))
+
+
+@lru_cache(maxsize=KEPT_GRIDS)
+def _clearance_field(water: shapely.MultiPolygon, cell: float) -> ClearanceField:
+    """The field of a water on cells of a size [m]; kept, as remedies ask for it again."""
+    west, south, east, north = water.bounds
+    norths = np.arange(south - cell, north + 2 * cell, cell)
+    easts = np.arange(west - cell, east + 2 * cell, cell)
+    shapely.prepare(water)
+    free = shapely.contains_xy(water, *np.meshgrid(easts, norths))
+    # a pier thinner than a cell hides between the centres: every cell that a shore passes through is forbidden
+    shore = shapely.get_coordinates(shapely.segmentize(shapely.boundary(water), cell / 2))
+    free[
+        np.rint((shore[:, 1] - norths[0]) / cell).astype(int), np.rint((shore[:, 0] - easts[0]) / cell).astype(int)
+    ] = False
+    free[[0, -1], :] = free[:, [0, -1]] = False
+    distance = np.asarray(scipy.ndimage.distance_transform_edt(free)) * cell - cell / 2
+    return ClearanceField(origin=np.array([norths[0], easts[0]]), cell_m=cell, clearance_m=distance.clip(0.0))
+
+
+def narrowest_passage(field: ClearanceField, start: Array, goal: Array) -> tuple[float, Array]:
+    """The largest clearance with which start (2,) and goal (2,) are connected, and where the passage is that narrow.
+
+    Returns:
+        Clearance [m] (zero when they are not connected at all), and the (2,) north/east place.
+    """
+    a, b = field.index(start), field.index(goal)
+    low, high = 0.0, float(min(field.clearance_m[a], field.clearance_m[b]))
+    eight = np.ones((3, 3))
+    while high - low > field.cell_m / 4:
+        middle = (low + high) / 2
+        regions, _ = scipy.ndimage.label(field.clearance_m >= middle, structure=eight)
+        low, high = (middle, high) if regions[a] == regions[b] else (low, middle)
+    regions, _ = scipy.ndimage.label(field.clearance_m >= high, structure=eight)
+    path = _path(field, start, goal, low - field.cell_m)
+    passage, beside = _first_passage(regions[field.index(path)])
+    apart = sum(scipy.ndimage.distance_transform_edt(regions != region) for region in beside if region)
+    among = path[passage]
+    return low, among[int(np.argmin(apart[field.index(among)]))] if any(beside) else among[len(among) // 2]
+
+
+def _first_passage(regions: np.ndarray) -> tuple[slice, tuple[int, int]]:
+    """The part of a path (k,) between the first two wide regions that it passes through, and these; 0 for none."""
+    wide = np.flatnonzero(regions)
+    changes = np.flatnonzero(np.diff(regions[wide]))
+    if len(wide) and not regions[0]:  # it begins in narrow water
+        first, last = 0, int(wide[0])
+    elif len(changes):
+        first, last = int(wide[changes[0]]), int(wide[changes[0] + 1])
+    else:
+        first, last = int(wide[-1]) if len(wide) else 0, len(regions) - 1
+    return slice(first, last + 1), (int(regions[first]), int(regions[last]))
+
+
+def _path(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:
+    """(k, 2) centres of a shortest eight-neighbour path through cells with a clearance; one row where there is none."""
+    field = fine.thinned(ROUTING_CELLS)
+    free = field.clearance_m >= clearance_m
+    free[field.index(goal)] = True
+    numbers = np.arange(free.size).reshape(free.shape)
+    tails, heads, lengths = [], [], []
+    for step_row, step_column in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a, b = _neighbours(numbers, step_row, step_column)
+        both = free.ravel()[a] & free.ravel()[b]
+        tails.append(a[both])
+        heads.append(b[both])
+        lengths.append(np.full(int(both.sum()), np.hypot(step_row, step_column)))
+    ends = np.concatenate(tails), np.concatenate(heads)
+    graph = scipy.sparse.coo_matrix((np.concatenate(lengths), ends), shape=(numbers.size, numbers.size)).tocsr()
+    before = scipy.sparse.csgraph.dijkstra(
+        graph, directed=False, indices=int(numbers[field.index(goal)]), return_predecessors=True
+    )[1]
+    cells = [int(numbers[field.index(start)])]
+    while (after := int(before[cells[-1]])) >= 0:
+        cells.append(after)
+    return field.centre(np.array(cells))
+
+
+def _neighbours(numbers: np.ndarray, step_row: int, step_column: int) -> tuple[np.ndarray, np.ndarray]:
+    rows, columns = numbers.shape
+    low, high = max(0, -step_column), columns - max(0, step_column)
+    a = numbers[: rows - step_row, low:high]
+    b = numbers[step_row:, low + step_column : high + step_column]
+    return a.ravel(), b.ravel()
+
+
+# The part of a chart that a trial can reach, so that planning does not depend on how much chart surrounds it.
+
+
+def reachable(area: SeaArea, ends: Array, reach_m: float) -> SeaArea:
+    """The water round the ends (k, 2), as far as a distance north, south, east and west, that is connected to them.
+
+    The area itself where that extends about as far, and where an end is not in the water.
+    """
+    east_north = np.asarray(ends)[:, ::-1]
+    least, most = east_north.min(axis=0) - reach_m, east_north.max(axis=0) + reach_m
+    west, south, east, north = area.water.bounds
+    all_in = (least <= (west, south)).all() and (most >= (east, north)).all()
+    water = area.water if all_in else as_multipolygon(shapely.intersection(area.water, shapely.box(*least, *most)))
+    parts, points = shapely.get_parts(water), shapely.points(east_north)
+    held = np.array([shapely.intersects(part, points) for part in parts])
+    found = shapely.MultiPolygon(list(parts[held.any(axis=1)]))
+    kept = shapely.box(*found.bounds).area > KEPT * shapely.box(*area.water.bounds).area
+    return area if kept or not held.any(axis=0).all() else replace(area, water=found)
+
+
+def connects(area: SeaArea, ends: Array) -> bool:
+    """Whether one part of the water holds all ends (k, 2)."""
+    points = shapely.points(np.asarray(ends)[:, ::-1])
+    return any(bool(shapely.intersects(part, points).all()) for part in area.water.geoms)
+
+
+def resolved(area: SeaArea, ends: Array, reach_m: float, *, hull_m: float) -> tuple[SeaArea, float]:
+    """The reachable water, no larger than the clearance grid resolves well for a hull, and its reach [m].
+
+    Args:
+        area, ends, reach_m: as for `reachable`.
+        hull_m: length of the hull.
+    """
+    reach_m = max(reach_m, LEAST_REACH_HULLS * hull_m)
+    found = reachable(area, ends, reach_m)
+    while grid_cell_m(found, hull_m / 8) > FINE_HULLS * hull_m:
+        smaller_m = reach_m * np.sqrt(0.5)
+        less = reachable(found, ends, smaller_m)
+        if smaller_m < LEAST_REACH_HULLS * hull_m or (connects(found, ends) and not connects(less, ends)):
+            break
+        found, reach_m = less, smaller_m
+    return found, reach_m
+
 
 KEPT_TABLES = 6  # visibility graphs, clearance grids and tables of distances that a process keeps
 TABLE_CELLS = 60_000  # of the table of distances to the goal

@@ -24,7 +24,6 @@ from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
-from expdesign.plan.legs.sailed import gathers_speed
 from expdesign.plan.legs.water import (
     ARRIVAL,
     FoundLeg,
@@ -32,6 +31,7 @@ from expdesign.plan.legs.water import (
     LegTask,
     LegWater,
     acceptable,
+    gathers_speed,
     nearest_turns,
     through_water,
 )

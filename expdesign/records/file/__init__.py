@@ -1,7 +1,7 @@
 """One file of measured data: header, cells, columns, clock, ranges."""
 
 from expdesign.records.file.cells import FIRST_ROW, read_cells
-from expdesign.records.file.clock import GAP_SAMPLE_TIMES, JITTER_SHARE, Clock, read_clock
+from expdesign.records.file.checks import GAP_SAMPLE_TIMES, JITTER_SHARE, Clock, check_ranges, read_clock
 from expdesign.records.file.names import (
     ANGLE,
     COLUMNS,
@@ -22,5 +22,4 @@ from expdesign.records.file.names import (
     meaning,
     mistyped,
 )
-from expdesign.records.file.ranges import check_ranges
 from expdesign.records.file.table import MISSING, Table, check_wind, read_table, relative_wind

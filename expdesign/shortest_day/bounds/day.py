@@ -11,8 +11,7 @@ from expdesign.errors import InputError
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.bounds import Headway, time_to_sail_s
 from expdesign.plan.legs import through_water
-from expdesign.plan.problem import PlanProblem
-from expdesign.plan.values import Plan, SailedTrial
+from expdesign.plan.values import Plan, PlanProblem, SailedTrial
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds.fewest_samples import BOX_GAP, fewest_samples
 from expdesign.shortest_day.bounds.motions import AFFINE, Affine, Motions, over_boxes

@@ -19,9 +19,8 @@ from expdesign.information import PrimitiveInformation
 from expdesign.memory import Memory, memory_in_use, recalled, remembering
 from expdesign.plan.assembly import check_start, ship_on_legs
 from expdesign.plan.control import capability
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.values import Plan, PlanSettings
+from expdesign.plan.values import Plan, PlanProblem, PlanSettings
 from expdesign.processes import begin, in_order, reported_together
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario

@@ -12,9 +12,8 @@ from pydantic.fields import FieldInfo
 
 from expdesign.scenario.card_file import CardFile
 from expdesign.scenario.charts.zones import AreaTable
-from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
+from expdesign.scenario.dictionaries import DictionaryTable, LoadsFile, PrimitiveTable
 from expdesign.scenario.import_files import COLUMNS_BESIDE, InstrumentsFile, MappingFile
-from expdesign.scenario.loads_file import LoadsFile
 from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.scenario.tables import LARGEST, Table, shown
 from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, ActuatorTable, VesselTable

@@ -17,10 +17,9 @@ from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive
 from expdesign.errors import InputError, NoAnswer, NoPlan, Unreachable
 from expdesign.plan.checked import may_be_verified
 from expdesign.plan.control import HELM_SHARE, STEADY_HULLS, USABLE_SHARE, HelmShip, capability
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import dispersion_m
 from expdesign.plan.solve import draft_trial, plan_drafted
-from expdesign.plan.values import Plan, PlanSettings
+from expdesign.plan.values import Plan, PlanProblem, PlanSettings
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario
 from expdesign.simulation import simulate_many

@@ -23,9 +23,8 @@ from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
 from expdesign.plan.assembly import check_start_speed
 from expdesign.plan.control import capability, needs_helm
-from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
+from expdesign.plan.values import LatticeProof, Plan, PlanProblem, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
