@@ -160,3 +160,36 @@ def test_stamps_that_repeat_swap_and_begin_anew_are_set_right() -> None:
     assert (np.diff(times) > 0).all()
     assert np.diff(times).max() > 30
     assert "begun anew" in notes[0]
+
+
+AT = 1.7e9 + np.arange(0.0, 1000.0)
+STRAYS = {
+    "an old row again": np.insert(AT, 700, AT[640]),
+    "old rows again": np.insert(AT, [700] * 10, AT[640:650]),
+    "a stamp of nought": np.where(np.arange(1000) == 700, 0.0, AT),
+    "a stamp far ahead": np.where(np.arange(1000) == 700, 9e9, AT),
+    "several of both": np.where(np.isin(np.arange(1000), (200, 201, 500)), 9e9, np.insert(AT[:-1], 700, AT[10])),
+}
+
+
+@pytest.mark.parametrize("kind", STRAYS)
+def test_a_few_stamps_out_of_order_move_nothing_that_follows(kind: str) -> None:
+    stamps = STRAYS[kind]
+    order, times, notes = set_right(stamps, what="x")
+    assert np.array_equal(times, stamps[order])
+    assert (np.diff(times) > 0).all()
+    strays = len(stamps) - len(order)
+    assert 1 <= strays <= 10
+    assert notes == [f"x: {f'{strays} rows are' if strays > 1 else '1 row is'} out of order in time and left out"]
+
+
+def test_parts_with_dates_are_sorted_and_those_without_go_on_after_a_gap() -> None:
+    swapped = np.concatenate([AT[500:], AT[:500]])
+    order, times, notes = set_right(swapped, what="x")
+    assert np.array_equal(times, AT)
+    assert np.array_equal(swapped[order], AT)
+    assert notes == ["x: its 2 parts are not in the order of their dates; they are sorted"]
+    _, times, notes = set_right(swapped - 1.7e9, what="x")
+    assert (np.diff(times) > 0).all()
+    assert times.max() > 1000.0
+    assert notes == ["x: the clock goes back once and counts as begun anew after a gap there"]

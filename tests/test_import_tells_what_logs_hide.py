@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from expdesign.importing import guess, read_log
+from expdesign.scenario import load_vessel
 from imported_runs import columns_of, notes_of, run_import, wrapped
 from logged_trial import (
     START_S,
@@ -237,3 +238,69 @@ def test_sentences_that_are_cut_anywhere_give_no_wrong_reading(tmp_path: Path) -
         (heading,) = log.channels
         assert np.array_equal(heading.values, 100.25 + np.arange(len(heading)))
         assert len(heading) in (19, 20)
+
+
+SPEEDS = {
+    "positions alone": (),
+    "speed and course": ("SOG [m/s]", "COG [deg]"),
+    "surge": ("surge speed [m/s]",),
+    "surge and sway": ("surge speed [m/s]", "sway speed [m/s]"),
+}
+
+
+@pytest.mark.parametrize("kind", SPEEDS)
+@pytest.mark.parametrize("from_east", [True, False])
+def test_headings_that_count_the_other_way_are_refused_with_what_turns_them_over(
+    kind: str, from_east: bool, tmp_path: Path, trip: Voyage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = trip.every(5)
+    heading = (math.pi / 2 if from_east else 0.0) - own.heading_rad
+    table = {
+        "time": own.time_s, "Lat": own.lat_deg, "Lon": own.lon_deg, "yaw [deg]": np.degrees(wrapped(heading)),
+        "yaw rate [rad/s]": -own.r_radps, "rpm": own.n_rps * 60, "rudder order [deg]": np.degrees(own.order_rad),
+        **{name: {"SOG [m/s]": own.speed_mps, "COG [deg]": np.degrees(own.course_rad) % 360,
+                  "surge speed [m/s]": own.u_mps, "sway speed [m/s]": own.v_mps}[name] for name in SPEEDS[kind]},
+    }  # fmt: skip
+    path = tmp_path / "a.csv"
+    np.savetxt(
+        path, np.stack(list(table.values()), axis=1), delimiter=",", header=",".join(table), comments="", fmt="%.9f"
+    )
+    status, _, out = run_import(path)
+    said = capsys.readouterr().err
+    assert status == 3
+    assert ("scale = -1.0 and offset = 1.5708 of the heading" in said) == from_east
+    assert "scale = -1.0 of its rate, turn it over" in said
+    mapping = (out / "mapping.toml").read_text()
+    blocks = mapping.split("[[channel]]")
+    for k, block in enumerate(blocks):
+        if '"heading_rad"' in block:
+            blocks[k] = (
+                re.sub(r"scale = .*\n|offset = .*\n", "", block) + "scale = -1.0\n" + "offset = 1.5708\n" * from_east
+            )
+        elif '"r_radps"' in block:
+            blocks[k] = re.sub(r"scale = .*\n", "", block) + "scale = -1.0\n"
+    (tmp_path / "turned.toml").write_text("[[channel]]".join(blocks))
+    status, said_json, out = run_import(path, options=("--map", str(tmp_path / "turned.toml")))
+    assert status == 0, capsys.readouterr().err
+    found = columns_of(said_json, out)
+    assert np.abs(wrapped(found["heading_rad"] - np.interp(found["time_s"], own.time_s, own.heading_rad))).max() < 1e-3
+
+
+def test_one_rudder_and_one_lever_of_a_log_are_those_of_all_of_the_vessel(tmp_path: Path, trip: Voyage) -> None:
+    single = load_vessel("scenarios/vessels/logged-50m.toml").actuators
+    twin = (*single, *(replace(one, number=2) for one in single))
+    log = read_log(write_dialect(tmp_path / "a.csv", trip.every(10)))
+    alone, both = (
+        {use.column: use for use in guess([log], actuators).uses if use.column} for actuators in (single, twin)
+    )
+    inputs = {name for name in alone if "rudder" in name or name.endswith("_rps")}
+    assert inputs
+    assert set(both) == set(alone) | {name.replace("1_", "2_") for name in inputs}
+    for name in inputs:
+        second = both[name.replace("1_", "2_")]
+        assert second.channel == both[name].channel
+        assert "of all 2, as the log has one" in second.why
+    sided = replace(log, channels=tuple(
+        replace(one, name=f"{one.name} port") if "rudder" in one.name.lower() else one for one in log.channels
+    ))  # fmt: skip
+    assert not any(use.column.endswith("rudder2_rad") for use in guess([sided], twin).uses)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,10 @@ Places = NDArray[np.signedinteger[Any]]
 GNSS, COMPUTER, OWN, NONE = "satellite time", "a computer's clock", "a clock of its own", "no clock"
 RESET_S, RESET_STEPS = 2.0, 10.0
 """A step back in time of more than both, in seconds and usual steps, is a clock that began anew."""
+STRAY_ROWS = 10
+"""Rows at most whose stamps are out of place where those before and after them go on: a bit was lost, a row is old."""
+DATED_S = 1e8
+"""Times beyond count from 1970, so that each is right by itself."""
 TIME = " time"  # of rows, as no field is named
 RESTART_GAP_S = 60.0
 """Put between readings before and after a clock began anew [s]."""
@@ -137,12 +142,13 @@ def set_right(time_s: Array, *, what: str) -> tuple[Places, Array, list[str]]:
     """Times (k,) as a clock has them -> the order (k,) of the rows in time, their times, and notes.
 
     A clock that began anew goes on after a gap; stamps that repeat, as coarse ones do, are spread evenly up to the
-    next; rows that were swapped are sorted.
+    next; rows that were swapped are sorted, and so are parts with dates that were joined in another order. A few rows
+    whose stamps neither those before nor those after them go on from are left out: they would move all that follows.
     """
     notes: list[str] = []
     order = np.flatnonzero(np.isfinite(time_s))
     if len(order) < len(time_s):
-        notes.append(f"{what}: {len(time_s) - len(order)} rows have no readable time and are left out")
+        notes.append(f"{what}: {_rows(len(time_s) - len(order))} without a readable time and left out")
     times = time_s[order]
     if len(times) < 3:
         return order, times, notes
@@ -152,14 +158,29 @@ def set_right(time_s: Array, *, what: str) -> tuple[Places, Array, list[str]]:
         order, times = order[::-1], times[::-1]
         steps = np.diff(times)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    resets = np.flatnonzero(steps < -max(RESET_S, RESET_STEPS * usual)) + 1
+    back_s = max(RESET_S, RESET_STEPS * usual)
+    stray = _stray(times, back_s)
+    if stray.any():
+        notes.append(f"{what}: {_rows(int(stray.sum()))} out of order in time and left out")
+        order, times = order[~stray], times[~stray]
+    resets = np.flatnonzero(np.diff(times) < -back_s) + 1
+    parts = np.split(np.arange(len(times)), resets)
+    in_order = sorted(parts, key=lambda part: times[part].min())
+    if (
+        len(resets)
+        and times.min() > DATED_S
+        and all(times[one].max() <= times[next_].min() for one, next_ in pairwise(in_order))
+    ):
+        notes.append(f"{what}: its {len(parts)} parts are not in the order of their dates; they are sorted")
+        places = np.concatenate(in_order)
+        order, times, resets = order[places], times[places], resets[:0]
     for place in resets:
         times = np.concatenate([times[:place], times[place:] + times[:place].max() + RESTART_GAP_S - times[place]])
     if len(resets):
-        notes.append(f"{what}: the clock goes back {len(resets)} times and counts as begun anew after a gap there")
+        notes.append(f"{what}: the clock goes back {_times(len(resets))} and counts as begun anew after a gap there")
     backward = np.diff(times) < 0
     if backward.any():
-        notes.append(f"{what}: {int(backward.sum())} stamps go back in time; the rows are sorted")
+        notes.append(f"{what}: {_stamps(int(backward.sum()), 'go', 'goes')} back in time; the rows are sorted")
         sorting = np.argsort(times, kind="stable")
         order, times = order[sorting], times[sorting]
     repeated = np.diff(times) == 0
@@ -168,9 +189,39 @@ def set_right(time_s: Array, *, what: str) -> tuple[Places, Array, list[str]]:
         places = np.arange(len(times))
         if len(stamps) < 2:
             return order[:1], times[:1], [*notes, f"{what}: all rows have one and the same time"]
-        notes.append(f"{what}: {int(repeated.sum())} stamps repeat; those rows are spread evenly up to the next stamp")
+        words = _stamps(int(repeated.sum()), "repeat", "repeats")
+        notes.append(f"{what}: {words}; those rows are spread evenly up to the next stamp")
         times = spread(places, stamps, at)
     return order, times, notes
+
+
+def _rows(count: int) -> str:
+    return f"{count} rows are" if count != 1 else "1 row is"
+
+
+def _stamps(count: int, many: str, one: str) -> str:
+    return f"{count} stamps {many}" if count != 1 else f"1 stamp {one}"
+
+
+def _times(count: int) -> str:
+    return f"{count} times" if count != 1 else "once"
+
+
+def _stray(times: Array, back_s: float) -> np.ndarray:
+    """Which stamps (k,) are out of place: a few that lag behind those around them, or that run ahead of them."""
+    stray = np.zeros(len(times), dtype=bool)
+    for place in np.flatnonzero(np.diff(times) < -back_s) + 1:
+        if stray[place - 1]:
+            continue
+        later = times[place : place + STRAY_ROWS + 1] >= times[place - 1] - back_s
+        earlier = times[max(place - STRAY_ROWS - 1, 0) : place][::-1] <= times[place]
+        lagging = int(np.argmax(later)) if later.any() else STRAY_ROWS + 1
+        ahead = int(np.argmax(earlier)) if earlier.any() else STRAY_ROWS + 1
+        if min(lagging, ahead) > STRAY_ROWS:
+            continue
+        stray[place : place + lagging] |= lagging <= ahead
+        stray[place - ahead : place] |= ahead < lagging
+    return stray
 
 
 def channels_of(

@@ -23,7 +23,7 @@ from expdesign.importing.mapping import (
     counted,
     dimension,
 )
-from expdesign.importing.names import COURSE_OR_HEADING, ORDER, Mark, family_of, marked, numbered
+from expdesign.importing.names import COURSE_OR_HEADING, ORDER, Mark, family_of, marked, numbered, shared
 from expdesign.values import Array
 from expdesign.vessel import Actuator
 
@@ -406,6 +406,7 @@ def guess(logs: Sequence[Log], actuators: Sequence[Actuator] = ()) -> Mapping:
     ]
     by_machine = dict(numbered([(u, m) for u, m in zip(uses, marks, strict=True) if u.column], channels, actuators))
     uses = [by_machine.get(k, use) for k, use in ((id(use), use) for use in uses)]
+    uses += shared(uses, marks, actuators)
     return Mapping(uses=tuple(uses), files=tuple(FileClock(file=log.source) for log in logs))
 
 

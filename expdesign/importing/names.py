@@ -28,7 +28,7 @@ from expdesign.importing.mapping import (
 )
 from expdesign.records.file import Source, is_input, meaning
 from expdesign.values import Array
-from expdesign.vessel import Actuator
+from expdesign.vessel import Actuator, stem
 
 COURSE_OR_HEADING = 3
 """Rank of words that mean the heading, but for tables with another heading: there they mean the course."""
@@ -63,6 +63,8 @@ RULES = (
     ("n", 0, r"\b(engine|shaft|prop(eller)?|motor|screw) (speed|revs?)\b"),
     (NORTHWARD, 0, r"\b(vn|vel n|v north|velocity north)\b|\blocal position ned vx\b|global position int vx"),
     (EASTWARD, 0, r"\b(ve|vel e|v east|velocity east)\b|\blocal position ned vy\b|global position int vy"),
+    ("u_mps", 0, r"^(?!.*\bgps\b).*\b(u|surge|longgroundspd|surge (speed|velocity))$"),
+    ("v_mps", 0, r"^(?!.*\bgps\b).*\b(v|sway|transgroundspd|sway (speed|velocity))$"),
     (SOG, 0, r"\b(sogn|sog|speed over ground|ground ?speed|gps speed|gps spd|rmc spd)\b"),
     (
         SOG,
@@ -70,8 +72,6 @@ RULES = (
         r"\b(spd|speed|v ground|velocity|groundspeed|geschwindigkeit|nopeus|fahrt|fart|vaart|snelheid|vitesse|"
         r"hastighe[td]|velocidad|velocita)$",
     ),
-    ("u_mps", 0, r"^(?!.*\bgps\b).*\b(u|surge|longgroundspd|surge speed)$"),
-    ("v_mps", 0, r"^(?!.*\bgps\b).*\b(v|sway|transgroundspd|sway speed)$"),
     ("depth_m", 0, r"\b(depth|depthm|dpt|sounding|dpth)\b"),
     ("north_m", 2, r"\b(north|northing|pn)\b"),
     ("east_m", 2, r"\b(east|easting|pe)\b"),
@@ -231,8 +231,8 @@ def numbered(
         if mark.column == "rudder":
             signal, scale = f"rudder{rudders.index(mark.machine) + 1}", _largest(actuators, "rudder", use)
         else:
-            stem = "a" if mark.column == "a" else "n"
-            signal, scale = f"{stem}{numbers[mark.machine]}", _largest(actuators, stem, use)
+            kind = "a" if mark.column == "a" else "n"
+            signal, scale = f"{kind}{numbers[mark.machine]}", _largest(actuators, kind, use)
         column = f"{prefix}{signal}_{'rps' if signal[0] == 'n' else 'rad'}"
         unit_words = (
             ""
@@ -242,21 +242,42 @@ def numbered(
         yield id(use), replace(use, column=column, scale=use.scale * scale, why=f"{use.why}; {said}{unit_words}")
 
 
+def shared(uses: Sequence[Use], marks: Sequence[Mark], actuators: Sequence[Actuator]) -> list[Use]:
+    """Further uses of a signal without side and number, of which the log has one and the vessel has several actuators."""
+    found = []
+    for own_stem, kinds in (("rudder", ("rudder",)), ("n", ("propeller", "azimuth")), ("a", ("azimuth",))):
+        signals = [name for one in actuators if one.kind in kinds for name in one.signals if stem(name) == own_stem]
+        ending = "rps" if own_stem == "n" else "rad"
+        own = [
+            (use, mark) for use, mark in zip(uses, marks, strict=True)
+            if mark.is_actuator and stem(use.column.removeprefix("reached_").removesuffix(f"_{ending}")) == own_stem
+        ]  # fmt: skip
+        if len(signals) < 2 or any(mark.machine != ("", "", "") for _, mark in own):
+            continue
+        for use, _ in own:
+            first = use.column.removeprefix("reached_").removesuffix(f"_{ending}")
+            why = f"{use.why}; of all {len(signals)}, as the log has one"
+            found += [
+                replace(use, column=use.column.replace(first, name), why=why) for name in signals if name != first
+            ]
+    return found
+
+
 def _as_listed(machine: tuple[str, str, str]) -> tuple[str, str, str]:
     """Stern before bow, port before starboard, by number."""
     bow, side, number = machine
     return bow, number.rjust(3), side
 
 
-def _largest(actuators: Sequence[Actuator], stem: str, use: Use) -> float:
+def _largest(actuators: Sequence[Actuator], wanted: str, use: Use) -> float:
     """What 100 per cent of an order are."""
     if use.unit not in SHARES:
         return 1.0
     limits = [
         limit.high for one in actuators for name, limit in zip(one.signals, one.limits, strict=True)
-        if name.rstrip("0123456789") == stem and np.isfinite(limit.high)
+        if stem(name) == wanted and np.isfinite(limit.high)
     ]  # fmt: skip
-    return limits[0] if limits else 1.0 if stem == "n" else np.pi / 180.0 * 35.0
+    return limits[0] if limits else 1.0 if wanted == "n" else np.pi / 180.0 * 35.0
 
 
 def _by_place(

@@ -20,4 +20,11 @@ are ignored and noted. Every error is a `FileError` with the rows concerned.
 from expdesign.records.file import COLUMNS
 from expdesign.records.load import load_records, read_levels, row_labels
 from expdesign.records.pieces import STREAM, Piece, Taken, as_file, pieces
-from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
+from expdesign.records.pose import (
+    VELOCITY_METHODS,
+    Fix,
+    central_difference,
+    last_fix,
+    mirrored_heading,
+    smoothed_velocity,
+)

@@ -1,5 +1,6 @@
 """Pose and velocity: positions, derived velocities, and whether they agree."""
 
+from expdesign.records.pose.agreement import check_agreement, check_heading, check_speed, mirrored_heading
 from expdesign.records.pose.motion import (
     MEASURED,
     SMOOTHED,
@@ -17,10 +18,7 @@ from expdesign.records.pose.motion import (
 )
 from expdesign.records.pose.position import (
     Fix,
-    check_agreement,
-    check_heading,
     check_jumps,
-    check_speed,
     last_fix,
     with_continuous_angles,
     with_metres,

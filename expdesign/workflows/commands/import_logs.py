@@ -60,7 +60,7 @@ from expdesign.importing.mapping import SOG
 from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
-from expdesign.records import load_records
+from expdesign.records import load_records, mirrored_heading
 from expdesign.requests import repeating
 from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Batch, Record
@@ -149,7 +149,13 @@ def import_logs(request: requests.Import, *, progress: Progress = silent) -> Out
         tables, kept, rejected, more = _tried(runs, found, ship, mapping, size_m, Path(scratch), within_s)
         notes += more
         if not kept:
-            why = "; ".join(f"{where}: {reason}" for where, reason in rejected) or "no helm or engine order acts in it"
+            places: dict[str, list[str]] = {}
+            for where, reason in rejected:
+                places.setdefault(reason, []).append(where)
+            why = "; ".join(
+                f"{at[0]}{f' and {len(at) - 1} more' if len(at) > 1 else ''}: {reason}" for reason, at in places.items()
+            )
+            why = f"{why}{_turned_over(why)}" if why else "no helm or engine order acts in it"
             none = NothingToWrite(f"no run of the record can be used. {why}")
             _leave_mapping(none, folder, mapping, read, notes, command)
             raise none
@@ -376,6 +382,10 @@ def _tried(
         )
     if batches:
         whole = Record(batches=tuple(batches))
+        poses = [batch.pose for batch in batches if batch.pose is not None]
+        if how := mirrored_heading(poses, found.sample_time_s):
+            why = f"heading_rad: {how}, as the positions show; expected clockwise from north"
+            return {}, [], [("in all runs", f"{why}")], []
         if ship is None:
             taken = fitted(taken, batches)
         doubts = checked(whole, taken).doubts
@@ -396,6 +406,14 @@ def _without_file(text: str) -> str:
     for old, new in PRESUMED:
         text = text.replace(old, new)
     return text
+
+
+def _turned_over(why: str) -> str:
+    """What turns a heading over in the mapping, where a refusal says that it counts the other way round."""
+    if "counter-clockwise" not in why:
+        return ""
+    offset = " and offset = 1.5708" if "from east" in why else ""
+    return f"; in the mapping, scale = -1.0{offset} of the heading, and scale = -1.0 of its rate, turn it over"
 
 
 def _origin_s(found: Sampled) -> float:
