@@ -26,6 +26,7 @@ from logged_trial import (
 )
 
 pytestmark = pytest.mark.usefixtures("undrawn")
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
@@ -287,7 +288,7 @@ def test_headings_that_count_the_other_way_are_refused_with_what_turns_them_over
 
 
 def test_one_rudder_and_one_lever_of_a_log_are_those_of_all_of_the_vessel(tmp_path: Path, trip: Voyage) -> None:
-    single = load_vessel("scenarios/vessels/logged-50m.toml").actuators
+    single = load_vessel(ROOT / "scenarios/vessels/logged-50m.toml").actuators
     twin = (*single, *(replace(one, number=2) for one in single))
     log = read_log(write_dialect(tmp_path / "a.csv", trip.every(10)))
     alone, both = (

@@ -243,7 +243,7 @@ def numbered(
 
 
 def shared(uses: Sequence[Use], marks: Sequence[Mark], actuators: Sequence[Actuator]) -> list[Use]:
-    """Further uses of a signal without side and number, of which the log has one and the vessel has several actuators."""
+    """Further uses of a signal without side and number, of which the log has one and the vessel several actuators."""
     found = []
     for own_stem, kinds in (("rudder", ("rudder",)), ("n", ("propeller", "azimuth")), ("a", ("azimuth",))):
         signals = [name for one in actuators if one.kind in kinds for name in one.signals if stem(name) == own_stem]
