@@ -85,5 +85,5 @@ def test_files_are_checked_by_their_ending(tmp_path: Path) -> None:
     assert check_route_file(tmp_path / "good.rtz") == check_route_file(tmp_path / "line.gpx") == []
     with pytest.raises(FileError, match=r"expected \.rtz or \.gpx"):
         check_route_file(tmp_path / "track.csv")
-    with pytest.raises(FileError, match="cannot be read"):
+    with pytest.raises(FileError, match="does not exist, expected an RTZ or GPX file"):
         check_route_file(tmp_path / "none.rtz")

@@ -336,7 +336,7 @@ def test_a_watch_goes_on_with_the_options_it_was_begun_with(
         (["{same}", "--resume", "--reference", "{reference}"], 2, "expected one"),
         (["{same}"], 3, "give files of a reference"),
         (["{same}", "--learn-h", "0.2"], 3, "expected at least"),
-        (["nothing.csv", "--reference", "{reference}"], 2, "cannot be read"),
+        (["nothing.csv", "--reference", "{reference}"], 2, "nothing.csv: does not exist, expected a CSV file"),
     ],
 )
 def test_what_cannot_be_watched_is_refused_in_one_line(

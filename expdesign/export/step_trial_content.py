@@ -290,14 +290,15 @@ def step_model_json(content: StepTrialContent) -> str:
 
 def _surface(part: Surface) -> dict[str, object]:
     powers = [
-        {"U": i, "r": j, "coefficient": c} for (i, j), c in zip(part.powers, part.coefficients.tolist(), strict=False)
+        {"U": i, "r": j, "coefficient": c}
+        for (i, j), c in zip(part.powers, part.fit.coefficients.tolist(), strict=False)
     ]
     bend = None
     if part.bend != NO_BEND:
-        bend = {"a_spm": part.bend[0], "b_mps": part.bend[1], "coefficient": float(part.coefficients[-1])}
+        bend = {"a_spm": part.bend[0], "b_mps": part.bend[1], "coefficient": float(part.fit.coefficients[-1])}
     return {
-        "terms": powers, "tanh": bend, "method": part.method, "penalty": part.penalty,
-        "held_out_rms": finite(part.held_out), "least_measured": part.least, "most_measured": part.most,
+        "terms": powers, "tanh": bend, "method": part.fit.method, "penalty": part.fit.penalty,
+        "held_out_rms": finite(part.fit.held_out), "least_measured": part.least, "most_measured": part.most,
     }  # fmt: skip
 
 

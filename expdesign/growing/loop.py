@@ -110,17 +110,17 @@ def grow_dictionary(
         UnknownName: no such family.
         InputError: no family or no range is left to search.
     """
-    case = _Case(
-        vessel=vessel,
-        environment=environment,
-        fixed=tuple(fixed_parameters),
-        mean_subtraction=mean_subtraction,
-        limits=motion_limits(settings, [item.primitive for item in information]),
-    )
-    check_informative(information, case.names, mean_subtraction)
-    progress("simulating candidates", 0.0)
     primitives = [item.primitive for item in information]
-    spaces, measure = searched_spaces(case.vessel, primitives, settings, case.limits), _measure(case)
+    measure = Measure(
+        vessel=vessel,
+        names=estimated_parameters(vessel.model, tuple(fixed_parameters)),
+        environment=environment,
+        mean_subtraction=mean_subtraction,
+        limits=motion_limits(settings, primitives),
+    )
+    check_informative(information, measure.names, mean_subtraction)
+    progress("simulating candidates", 0.0)
+    spaces = searched_spaces(vessel, primitives, settings, measure.limits)
     rng = np.random.default_rng(settings.seed or 0)
     archives = pool_of(spaces, measure, settings.pool, settings.seed or 0)
     grown, specs, rounds = list(information), list[PrimitiveSpec](), list[GrowRound]()
@@ -134,7 +134,7 @@ def grow_dictionary(
         left = -np.inf if found is None else found.merit
         if found is None or len(rounds) == settings.rounds:
             break
-        item, spec = _addition(case, best, found.spec, settings, part)
+        item, spec = _addition(measure, best, found.spec, settings, part)
         left = sensitivity(best, item, mean_subtraction)
         if left <= best.dimension * (1 + settings.tolerance):
             break
@@ -151,7 +151,7 @@ def grow_dictionary(
                 sensitivity=left,
                 searched=found.merit,
                 log_det_gain=best.log_det - before.log_det,
-                efficiency=float(np.exp((best.log_det - first.log_det) / len(case.names))),
+                efficiency=float(np.exp((best.log_det - first.log_det) / len(measure.names))),
                 excitation_condition=item.excitation_condition,
             )
         )
@@ -159,40 +159,40 @@ def grow_dictionary(
         specs=tuple(specs),
         information=tuple(grown),
         rounds=tuple(rounds),
-        limits=case.limits,
+        limits=measure.limits,
         evaluated=sum(len(archive.points) for archive in archives),
         dimension=best.dimension,
-        parameters=len(case.names),
+        parameters=len(measure.names),
         best_left=left,
     )
 
 
 def _addition(
-    case: _Case, best: Optimum, spec: PrimitiveSpec, settings: GrowSettings, progress: Progress
+    measure: Measure, best: Optimum, spec: PrimitiveSpec, settings: GrowSettings, progress: Progress
 ) -> tuple[PrimitiveInformation, PrimitiveSpec]:
     """The candidate found, or commands optimised from it if they are more informative."""
-    item = case.scored(spec)
+    item = _scored(measure, spec)
     if not settings.free_form:
         return item, spec
     progress("optimising its commands", 0.9)
-    free = _free_form(case, best, item)
+    free = _free_form(measure, best, item)
     if free is None:
         return item, spec
-    scored = case.scored(free)
-    over = violation(scored.primitive.trajectory.velocity[None], case.limits)[0]
-    better = sensitivity(best, scored, case.mean_subtraction) > sensitivity(best, item, case.mean_subtraction)
+    scored = _scored(measure, free)
+    over = violation(scored.primitive.trajectory.velocity[None], measure.limits)[0]
+    better = sensitivity(best, scored, measure.mean_subtraction) > sensitivity(best, item, measure.mean_subtraction)
     return (scored, free) if better and over <= FREE_FORM_EXCESS else (item, spec)
 
 
-def _free_form(case: _Case, best: Optimum, item: PrimitiveInformation) -> PrimitiveSpec | None:
+def _free_form(measure: Measure, best: Optimum, item: PrimitiveInformation) -> PrimitiveSpec | None:
     run = item.primitive
     values = optimise_commands(
         FreeForm(
-            vessel=case.vessel,
-            names=case.names,
+            vessel=measure.vessel,
+            names=measure.names,
             gradient=best.inverse,
-            mean_subtraction=case.mean_subtraction,
-            limits=case.limits,
+            mean_subtraction=measure.mean_subtraction,
+            limits=measure.limits,
             entry_inputs=run.entry_inputs,
             commands=run.commands.values,
             velocity=run.trajectory.velocity,
@@ -206,29 +206,17 @@ def _free_form(case: _Case, best: Optimum, item: PrimitiveInformation) -> Primit
     return PrimitiveSpec(name=run.name, family="recorded", settings=settings, commands=commands)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Case:
-    """The arguments common to the scoring of all candidates."""
-
-    vessel: Vessel
-    environment: Environment
-    fixed: tuple[str, ...]
-    mean_subtraction: str
-    limits: Array
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return estimated_parameters(self.vessel.model, self.fixed)
-
-    def scored(self, spec: PrimitiveSpec) -> PrimitiveInformation:
-        (item,) = score_primitives(
-            self.vessel,
-            [build_primitive(self.vessel, spec)],
-            environment=self.environment,
-            fixed_parameters=self.fixed,
-            mean_subtraction=self.mean_subtraction,
-        )
-        return item
+def _scored(measure: Measure, spec: PrimitiveSpec) -> PrimitiveInformation:
+    """A candidate as `information.score_primitives` scores it."""
+    names = estimated_parameters(measure.vessel.model, ())
+    (item,) = score_primitives(
+        measure.vessel,
+        [build_primitive(measure.vessel, spec)],
+        environment=measure.environment,
+        fixed_parameters=[name for name in names if name not in measure.names],
+        mean_subtraction=measure.mean_subtraction,
+    )
+    return item
 
 
 def motion_limits(settings: GrowSettings, primitives: Sequence[Primitive]) -> Array:
@@ -262,16 +250,6 @@ def searched_spaces(
     run_s = settings.run_s or float(np.median([item.duration_s for item in primitives]))
     chosen = tuple(family(name) for name in settings.families) or FAMILIES
     return family_spaces(vessel, chosen, limits, max(round(run_s / step_s), 2) * step_s)
-
-
-def _measure(case: _Case) -> Measure:
-    return Measure(
-        vessel=case.vessel,
-        names=case.names,
-        environment=case.environment,
-        mean_subtraction=case.mean_subtraction,
-        limits=case.limits,
-    )
 
 
 def _unused(number: int, kind: str, grown: Sequence[PrimitiveInformation]) -> str:

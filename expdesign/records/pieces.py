@@ -20,7 +20,7 @@ from typing import TextIO
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.input_files import check_ends
+from expdesign.input_files import readable
 from expdesign.records.file import FIRST_ROW, GAP_SAMPLE_TIMES, JITTER_SHARE, MISSING, Inputs, Sources, choose_columns
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
@@ -302,10 +302,7 @@ def _opened(source: Path) -> Iterator[TextIO]:
     if source == STREAM:
         yield sys.stdin
         return
-    check_ends(source, "a CSV file, or - for the standard input")
-    try:
+    with readable(source, "a CSV file, or - for the standard input"):
         file = source.open(encoding="utf-8-sig", errors="surrogateescape")
-    except OSError as error:
-        raise FileError(source, "", f"cannot be read: {error.strerror or error}") from None
     with file:
         yield file

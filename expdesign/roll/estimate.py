@@ -28,10 +28,12 @@ from expdesign.errors import InputError
 from expdesign.roll.effects import (
     EFFECT_NAMES,
     MOST_TRIES,
+    TILT,
     by_effects,
     missed_effects,
     missing_sizes,
     most_effects,
+    tilts_of,
     unseen_effects,
     with_effects,
     without_effects,
@@ -50,7 +52,6 @@ from expdesign.roll.problem import (
 )
 from expdesign.roll.profile import load_interval
 from expdesign.roll.regression import MOST_SURPRISE, flat_spectrum, spectrum
-from expdesign.roll.tilt import TILT, tilts_of
 from expdesign.values import Array, seal
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.roll import G_MPS2, Load

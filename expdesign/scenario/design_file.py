@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.durations import Budget, Constraints
 from expdesign.errors import FileError, nearest
 from expdesign.indices import OUTCOMES
-from expdesign.input_files import check_ends
+from expdesign.input_files import read_text
 from expdesign.scenario.design_tables import LONGEST_TOTAL_S, AccuracyTable, BudgetTable, DesignTable, build_grow
 from expdesign.scenario.tables import Entry, same_keys, shown
 from expdesign.scenario.values import DesignSettings
@@ -27,12 +27,10 @@ def load_repeats(path: Path | str, *, names: Sequence[str]) -> tuple[int, ...]:
     Raises:
         FileError: the file is missing or not of that kind, or names an unknown primitive.
     """
-    check_ends(Path(path), EXPECTED)
+    text = read_text(Path(path), EXPECTED)
     try:
-        entries = json.loads(Path(path).read_text(encoding="utf-8"))["primitives"]
+        entries = json.loads(text)["primitives"]
         repeats = {entry["name"]: entry["repeats"] for entry in entries}
-    except OSError as error:
-        raise FileError(path, "", f"cannot be read: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
         raise FileError(path, "primitives", f"expected {EXPECTED}: a list of {{name, repeats, ...}}") from None
     if len(repeats) < len(entries):

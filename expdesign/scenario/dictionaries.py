@@ -58,7 +58,7 @@ def load_recorded(path: Path | str) -> tuple[Commands, dict[str, float]]:
         FileError: unreadable, without commands, with uneven times or with cells that are not numbers.
     """
     source = Path(path)
-    rows = list(csv.reader(io.StringIO(read_text(source, "CSV"))))
+    rows = list(csv.reader(io.StringIO(read_text(source, "a CSV file"))))
     header = [cell.strip() for cell in rows[0]] if rows else []
     if len(set(header)) < len(header):
         raise FileError(source, "row 1", "names a column twice")

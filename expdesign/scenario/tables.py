@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from expdesign.errors import FileError, nearest
-from expdesign.input_files import check_ends
+from expdesign.input_files import read_text
 
 LARGEST = 1e12
 """Largest accepted number, far beyond any length, time or speed of a trial."""
@@ -92,36 +92,13 @@ class Entry:
         return target
 
 
-def read_text(path: Path, kind: str) -> str:
-    """The text of a file.
-
-    Args:
-        kind: expected kind of file, for messages, e.g. "TOML".
-
-    Raises:
-        FileError: missing, a directory, unreadable or not UTF-8.
-    """
-    check_ends(path, f"a {kind} file")
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        problem = f"does not exist, expected a {kind} file"
-    except IsADirectoryError:
-        problem = f"is a directory, expected a {kind} file"
-    except UnicodeDecodeError as error:
-        problem = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x} at offset {error.start})"
-    except (OSError, ValueError) as error:
-        problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    raise FileError(path, "", problem)
-
-
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, unchecked.
 
     Raises:
         FileError: unreadable, or not TOML; the message gives the line.
     """
-    text = read_text(path, "TOML")
+    text = read_text(path, "a TOML file")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

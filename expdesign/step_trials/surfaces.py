@@ -65,6 +65,9 @@ class Fit:
     coefficients: Array  # (p,) of the columns as given
     held_out: float  # weighted root mean square error of cross-validation, unit of the values
 
+    def __post_init__(self) -> None:
+        seal(self, coefficients="p")
+
 
 def best_fit(samples: Sampled) -> Fit:
     """Ridge or lasso, whichever predicts what was held out better."""
@@ -155,22 +158,15 @@ class Surface:
     """A function of U [m/s] and r [rad/s]."""
 
     powers: tuple[tuple[int, int], ...]  # of U and r in each term
-    coefficients: Array  # (p,) of the terms, the last one of tanh(a (U - b)) where there is a bend
     bend: tuple[float, float]  # a [s/m] and b [m/s]; `NO_BEND` for none
-    # method, penalty: of the regression
-    method: str
-    penalty: float
-    held_out: float  # root mean square error of cross-validation
+    fit: Fit  # its coefficients are those of the terms, the last one of tanh(a (U - b)) where there is a bend
     # least, most: smallest and largest value measured
     least: float
     most: float
 
-    def __post_init__(self) -> None:
-        seal(self, coefficients="p")
-
     def __call__(self, state: Array) -> Array:
         """(...) value at states (..., 2)."""
-        return np.asarray(_columns(state, self.powers, self.bend) @ self.coefficients)
+        return np.asarray(_columns(state, self.powers, self.bend) @ self.fit.coefficients)
 
     def at(self, u: float, r: float) -> float:
         """Value at one state, quicker than for an array."""
@@ -180,7 +176,7 @@ class Surface:
 
     @cached_property
     def _numbers(self) -> list[float]:
-        return [float(one) for one in self.coefficients]
+        return [float(one) for one in self.fit.coefficients]
 
 
 def _columns(state: Array, powers: Sequence[tuple[int, int]], bend: tuple[float, float]) -> Array:
@@ -209,11 +205,8 @@ def fitted_surface(
     weights = np.ones(len(values)) if weights is None else weights
     sampled = {bend: _sampled(states, values, weights, powers, bend) for bend in candidates}
     best = min(candidates, key=lambda bend: ridge(sampled[bend]).held_out)
-    fit: Fit = best_fit(sampled[best])
-    return Surface(
-        powers=powers, coefficients=fit.coefficients, bend=best, method=fit.method, penalty=fit.penalty,
-        held_out=fit.held_out, least=float(values.min()), most=float(values.max()),
-    )  # fmt: skip
+    fit = best_fit(sampled[best])
+    return Surface(powers=powers, bend=best, fit=fit, least=float(values.min()), most=float(values.max()))
 
 
 def _sampled(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -10,10 +11,13 @@ from dataclasses import dataclass, replace
 from functools import partial, wraps
 from inspect import cleandoc
 from pathlib import Path
+from typing import Any, TypeVar
 
-from expdesign.errors import InputError
+from expdesign import __version__
+from expdesign.errors import FileError, InputError
 from expdesign.export.document import Document
 from expdesign.export.folder import Content, write_files
+from expdesign.input_files import read_text
 from expdesign.interruptions import interruptions_wait
 from expdesign.memory import remembering, user_memory
 from expdesign.processes import local_processes, on_cluster, processors
@@ -135,6 +139,25 @@ def finished(
     paths = write_files(getattr(request, "out", None) or usual, files)
     progress("done", 1.0)
     return Outcome(files=paths, document=document)
+
+
+Kept = TypeVar("Kept")
+
+
+def left_state(path: Path, restored: Callable[[dict[str, Any]], Kept]) -> Kept:
+    """The state that an earlier watch left, as `restored` makes it of its table.
+
+    Raises:
+        FileError: there is none, or it is of another kind or version.
+    """
+    text = read_text(path, "the state that an earlier watch left")
+    try:
+        table: dict[str, Any] = json.loads(text)
+        if table["version"] == __version__:
+            return restored(table)
+    except (KeyError, TypeError, ValueError, AttributeError):
+        pass
+    raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one")
 
 
 def workflow(work: Callable[..., Outcome]) -> Callable[..., Outcome]:

@@ -14,12 +14,13 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from expdesign.conventions import wrap_angle
 from expdesign.errors import FileError
-from expdesign.input_files import check_ends
+from expdesign.input_files import read_text
 from expdesign.signals import AUXILIARY, Batch
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
 TIME_DECIMALS = 9
+RESULT = "a file as expdesign run writes it"
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -121,7 +122,7 @@ def read_json(path: Path, kind: type[Kind], expected: str) -> Kind:
         FileError: the file is missing or garbled, or an entry is.
     """
     try:
-        return kind.model_validate_json(read_text(path))
+        return kind.model_validate_json(read_text(path, RESULT))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         if first["type"] == "json_invalid" or not first["loc"]:
@@ -135,20 +136,3 @@ def read_json(path: Path, kind: type[Kind], expected: str) -> Kind:
         if first["type"] == "missing":
             problem = f"is missing, expected {expected}"
         raise FileError(path, ".".join(str(part) for part in first["loc"]), problem) from None
-
-
-def read_text(path: Path) -> str:
-    """The text of a result file.
-
-    Raises:
-        FileError: it is missing, cannot be read, or is no text.
-    """
-    check_ends(path, "a file as expdesign run writes it")
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise FileError(path, "", "does not exist") from None
-    except UnicodeDecodeError:
-        raise FileError(path, "", "is not UTF-8 text") from None
-    except OSError as error:
-        raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None

@@ -19,7 +19,7 @@ from lxml import etree
 from expdesign.errors import FileError
 from expdesign.export.formats.gpx import GPX
 from expdesign.export.formats.rtz import LARGEST_FILE, SPACE, VERSIONS
-from expdesign.input_files import check_ends
+from expdesign.input_files import readable
 
 CHILDREN = {
     "route": ("routeInfo", "waypoints", "schedules", "extensions"),
@@ -65,11 +65,8 @@ def check_route_file(path: Path) -> list[str]:
     checks = {".rtz": check_rtz, ".gpx": check_gpx}
     if path.suffix.lower() not in checks:
         raise FileError(path, "", f"has the ending {path.suffix or 'none'}, expected .rtz or .gpx")
-    check_ends(path, "an RTZ or GPX file")
-    try:
+    with readable(path, "an RTZ or GPX file"):
         content = path.read_bytes()
-    except OSError as error:
-        raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None
     return checks[path.suffix.lower()](content, path.stem)
 
 

@@ -15,8 +15,9 @@ from pydantic import Field
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError, NoPlan
-from expdesign.export.files.text import Entry, read_json, read_text
+from expdesign.export.files.text import RESULT, Entry, read_json
 from expdesign.export.routes.route import Fence
+from expdesign.input_files import read_text
 from expdesign.plan.values import Leg, Plan
 from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory
@@ -267,7 +268,7 @@ def _sample(path: Path, file: PlanFile, key: str, time_s: float) -> int:
 
 
 def _read_table(path: Path, columns: tuple[str, ...]) -> Array:
-    rows = list(csv.reader(read_text(path).splitlines()))
+    rows = list(csv.reader(read_text(path, RESULT).splitlines()))
     if not rows or tuple(rows[0]) != columns:
         found = ",".join(rows[0]) if rows else "nothing"
         raise FileError(path, "row 1", f"has the columns {found}, expected {','.join(columns)}")

@@ -15,7 +15,7 @@ from expdesign.importing.readers.autopilots import is_ardupilot, is_ros, read_ar
 from expdesign.importing.readers.n2k import is_n2k, is_signalk, read_n2k, read_signalk
 from expdesign.importing.readers.sheets import read_excel, read_matlab, read_matlab73, read_parquet
 from expdesign.importing.readers.text import is_text, read_text
-from expdesign.input_files import check_ends
+from expdesign.input_files import readable
 
 
 def _begins(*magic: bytes) -> Callable[[Path, bytes], bool]:
@@ -103,13 +103,8 @@ def read_log(path: Path, *, sample_time_s: float = 0.0, beside: int = 0) -> Log:
         FileError: missing, empty, of no known format, broken or too large, or the library that reads it is not
             installed.
     """
-    check_ends(path, "a log")
-    try:
+    with readable(path, "a log"):
         head = b"" if path.is_dir() else _head(path)
-    except FileNotFoundError:
-        raise FileError(path, "", "does not exist, expected a log") from None
-    except OSError as error:
-        raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None
     if path.is_dir() and not is_ros(path, head):
         raise FileError(path, "", "is a folder without metadata.yaml, expected files, or the folder of a ROS 2 bag")
     if not head and not path.is_dir():

@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.input_files import check_ends
+from expdesign.input_files import readable
 from expdesign.values import Array
 
 BLOCK_ROWS = 4096  # rows held as text at once
+CSV = "a CSV file"
 READ_BYTES = 1 << 20  # bytes read at once while a file is checked to be text
 
 SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
@@ -82,8 +83,7 @@ def read_cells(path: Path) -> Cells:
     Raises:
         FileError: unreadable, not UTF-8, empty, no header, or another separator.
     """
-    check_ends(path, "a CSV file")
-    with _readable(path):
+    with readable(path, CSV):
         _check_text(path)
         _check_first_line(path)
         with _rows(path) as rows:
@@ -103,21 +103,6 @@ def shown(text: str) -> str:
 def _one_line(name: str) -> str:
     """A column name with single blanks, cut where it gets longer than any name."""
     return "".join(letter if letter.isprintable() else "?" for letter in " ".join(name.split()))[: 2 * LONGEST_SHOWN]
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    """Errors of reading a file as one line."""
-    try:
-        yield
-        return
-    except FileNotFoundError:
-        problem = "does not exist, expected a CSV file"
-    except IsADirectoryError:
-        problem = "is a directory, expected a CSV file"
-    except (OSError, ValueError) as error:
-        problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    raise FileError(path, "", problem)
 
 
 def _check_text(path: Path) -> None:
@@ -174,7 +159,7 @@ def _readable_rows(path: Path, reader: Iterator[list[str]]) -> Iterator[list[str
 def _row_blocks(path: Path) -> Iterator[list[list[str]]]:
     """Rows 2, 3, ... without the empty ones at the end."""
     empty = 0
-    with _readable(path), _rows(path) as rows:
+    with readable(path, CSV), _rows(path) as rows:
         next(rows)
         while block := list(islice(rows, BLOCK_ROWS)):
             before, empty = empty, 0

@@ -22,7 +22,8 @@ import numpy as np
 import shapely
 
 from expdesign.errors import InputError
-from expdesign.scenario.tables import Entry, read_text, shown
+from expdesign.input_files import read_text
+from expdesign.scenario.tables import Entry, shown
 from expdesign.values import Array
 
 AREA_ROUNDING_DEG2 = 1e-13  # area of rounding, for outlines of about one degree; a tenth of a square decimetre
@@ -148,7 +149,7 @@ def _read_json(path: Path) -> object:
         raise entry.error(f"holds {constant}, expected finite numbers")
 
     try:
-        content: object = json.loads(read_text(path, "GeoJSON"), parse_constant=refuse)
+        content: object = json.loads(read_text(path, "a GeoJSON file"), parse_constant=refuse)
     except json.JSONDecodeError as error:
         place = f"at line {error.lineno}, column {error.colno}"
         raise entry.error(f"is not valid JSON: {error.msg} ({place})") from None

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from expdesign import __version__, requests
-from expdesign.errors import FileError, InputError, NotInformative
+from expdesign.errors import InputError, NotInformative
 from expdesign.export.folder import Content, write_files
 from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json
 from expdesign.export.monitor_page import budget_entries, monitor_document
@@ -33,7 +33,7 @@ from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
 from expdesign.requests import repeating
-from expdesign.workflows.outcome import Outcome, finished, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, left_state, shared, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.watched_ship import Asked, Late, Read, prepared
 from expdesign.workflows.steps.watching import (
@@ -267,15 +267,11 @@ def _resumed(path: Path, asked: Asked) -> Watch:
         FileError: there is none, or it is of another kind or version.
         InputError: it was begun with other options.
     """
-    try:
-        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if table["version"] != __version__:
-            raise ValueError("of another version")
-        now, begun = restored_watch(table), {name: float(table["options"][name]) for name in _kept(asked)}
-    except FileNotFoundError:
-        raise FileError(path, "", "does not exist, expected the state that an earlier watch left") from None
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one") from None
+
+    def restored(table: dict[str, Any]) -> tuple[Watch, dict[str, float]]:
+        return restored_watch(table), {name: float(table["options"][name]) for name in _kept(asked)}
+
+    now, begun = left_state(path, restored)
     for name, value in _kept(asked).items():
         if begun[name] != value:
             raise InputError(f"{name} is {value:g}, but the watch was begun with {begun[name]:g}; expected the same")

@@ -44,7 +44,7 @@ from expdesign.step_trials.live import (
     restored_state,
 )
 from expdesign.vessel import Actuator, Limit, column_name
-from expdesign.workflows.outcome import Outcome, Told, finished, silently, workflow
+from expdesign.workflows.outcome import Outcome, Told, finished, left_state, silently, workflow
 from expdesign.workflows.steps.measured import equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -244,10 +244,8 @@ def _resumed(path: Path, steps: StepList) -> _Watch:
     Raises:
         FileError: there is none, or it is of another kind, version or list.
     """
-    try:
-        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if table["version"] != __version__:
-            raise ValueError("of another version")
+
+    def restored(table: dict[str, Any]) -> _Watch:
         if table["steps"] != json.loads(json.dumps(saved(steps))):
             raise FileError(path, "steps", "are of another list, expected that of --steps")
         return _Watch(
@@ -256,10 +254,8 @@ def _resumed(path: Path, steps: StepList) -> _Watch:
             notes=tuple(table["notes"]),
             events=table["events"],
         )
-    except FileNotFoundError:
-        raise FileError(path, "", "does not exist, expected the state that an earlier watch left") from None
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one") from None
+
+    return left_state(path, restored)
 
 
 def _document(content: LiveContent) -> Document:
