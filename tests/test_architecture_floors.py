@@ -57,6 +57,7 @@ FLOORS = {
         ("fit",),
         ("select",),
         ("remainder", "prediction_comparison"),
+        ("stated_parameters",),
         ("judgement",),
         ("values",),
         ("conclusions",),

@@ -11,20 +11,22 @@ import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
-from expdesign.diagnosis import diagnose
+from expdesign.diagnosis import diagnose, stated_parameters
 from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.causes.hull import CHANGE_POINTS
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import AHEAD_S, FitOptions, HeldOut, counting_stretches, fit
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import stable_windows
+from expdesign.diagnosis.motion import initial_states, stable_windows
 from expdesign.diagnosis.prediction_comparison import (
     MUCH,
     Compared,
+    _values_tried,
     compare_predictions,
     fitted_to_all,
     signed_rank_p_values,
 )
-from expdesign.diagnosis.select import Selection, Step
+from expdesign.diagnosis.select import Selection, Step, open_candidates
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import silent
 from expdesign.signals import Record
@@ -51,6 +53,21 @@ def compared(record: Record, seed: int = 0) -> tuple[ExtendedModel, Compared]:
 def biased() -> tuple[ExtendedModel, Compared]:
     """With a heading bias."""
     return compared(trial(1, faults={"heading_bias": BIAS_RAD}))
+
+
+def test_a_time_that_was_chosen_on_what_is_held_out_counts_as_often_as_it_was_tried():
+    """Its stretches show a change where the error is worst, of a ship that does not change; fits hold the time."""
+    record = trial(1)
+    ship = extended_model(vessel_of("coaster"), record)
+    windows = cut_windows(ship.model, record, longest_s=AHEAD_S)
+    base = fit(ship, windows, (), starts=initial_states(windows), options=FitOptions(steps=0))
+    candidates = open_candidates(base, windows)
+    tried = {
+        one.cause: _values_tried(SimpleNamespace(test=SimpleNamespace(candidate=one)), candidates)  # type: ignore[arg-type]
+        for one in candidates
+    }
+    assert tried["change_point"] == CHANGE_POINTS
+    assert {tried[one.cause] for one in candidates if one.grid is None} == {1}
 
 
 @pytest.mark.thorough
@@ -167,7 +184,7 @@ def test_beside_the_file_a_cause_predicts_no_worse_than_all_parameters_re_estima
 
     parameters = Candidate(cause="parameters", free={"theta:Y_v": 0.0})
     monkeypatch.setattr(judging, "harms", lambda *_: False)
-    monkeypatch.setattr(judging, "open_candidates", lambda *_: [parameters])
+    monkeypatch.setattr(stated_parameters, "open_candidates", lambda *_: [parameters])
     monkeypatch.setattr(judging, "fitted_to_all", chosen)
     kept = Selection(steps=(), first=SimpleNamespace(ship=None), last=None, last_tests=())  # type: ignore[arg-type]
     current, without = of("current", 0.3, weather=True), errors(np.ones((10, 3)))

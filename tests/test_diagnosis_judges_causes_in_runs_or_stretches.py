@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from expdesign.diagnosis import judgement
+from expdesign.diagnosis import judgement, stated_parameters
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit.held_out import HeldOut, certain_reductions, held_out_gain
 from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
@@ -158,11 +158,11 @@ def test_parameters_far_beyond_the_file_are_the_other_answer_where_they_alone_ga
     step = Step(chosen=chosen, p_value=0.0, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
     first = Model("first", keys=("theta:Y_v",), ship=None)
     found = replace(steps_of("wind"), steps=(step,), first=first)  # type: ignore[arg-type]
-    monkeypatch.setattr(judgement, "within_stated_std", lambda _fit: False)
-    monkeypatch.setattr(judgement, "only_nuisance", lambda *_: False)
-    monkeypatch.setattr(judgement, "prediction_gain", lambda *_: (np.nan, (np.nan, np.nan)))
+    monkeypatch.setattr(stated_parameters, "within_stated_std", lambda _fit: False)
+    monkeypatch.setattr(stated_parameters, "only_nuisance", lambda *_: False)
+    monkeypatch.setattr(stated_parameters, "prediction_gain", lambda *_: (np.nan, (np.nan, np.nan)))
     parameters = Candidate(cause="parameters", free={"theta:Y_v": 0.0})
-    monkeypatch.setattr(judgement, "open_candidates", lambda *_: [parameters])
+    monkeypatch.setattr(stated_parameters, "open_candidates", lambda *_: [parameters])
     validation = SimpleNamespace(of=lambda _: errors(alone))
-    judged = judgement.with_parameters_as_rival(found, [errors(20.0), after], validation, None, 0)  # type: ignore[arg-type]
+    judged = stated_parameters.with_parameters_as_rival(found, [errors(20.0), after], validation, None, 0)  # type: ignore[arg-type]
     assert [one.candidate.cause for one in judged.steps[0].alternatives] == ["parameters"] * rival

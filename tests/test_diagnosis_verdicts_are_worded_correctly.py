@@ -89,9 +89,17 @@ def test_every_cause_of_a_verdict_has_its_own_number():
     ]
     assert verdict(some, BEFORE).startswith(
         "The simulation lacks the term Y_r and the scale of the rate gyro. On runs held out of the fit, adding "
-        "the term Y_r halves the sway error (42 to 58 %) and the scale of the rate gyro cuts the yaw error by 30 % "
-        "(25 to 36 %). "
+        "the term Y_r halves the sway error (42 to 58 %) and adding the scale of the rate gyro cuts the yaw error by "
+        "30 % (25 to 36 %). "
     )
+
+
+def test_the_best_candidate_is_the_one_that_gains_most_wherever_it_was_found():
+    """A sign of the search or the best of those compared by predictions; what gains nothing is none."""
+    bad, lever = replace(BEFORE, fit=np.array([30.0, -10.0, 50.0])), Lead("lever_arm", 13.7, (-1.0, 18.0))
+    lost = Unexplained(outputs=OUTPUTS, fit=bad.fit, force_share=np.zeros(3), leads=(Lead("wind", 4.9, (0.5, 8.9)),))
+    for signs, best in (((lever,), "the distance of a sensor"), ((), "wind"), ((replace(lever, gain=-1.0),), "wind")):
+        assert f"the best candidate is {best}" in verdict([], bad, unexplained=lost, signs=signs)
 
 
 def test_a_gain_is_told_by_the_output_that_improves_most_of_those_that_surely_do():

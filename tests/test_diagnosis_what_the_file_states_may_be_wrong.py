@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from diagnosis_case import from_pose, hidden_record, vessel_of
+from diagnosis_case import Told, drawn_parameters, from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.accuracy import accuracy
 from expdesign.diagnosis.causes import CAUSES
@@ -157,3 +157,46 @@ def test_a_lag_of_propellers_that_is_longer_than_stated_is_found():
     assert found.findings[0].cause == "actuator_lag"
     (lag,) = found.findings[0].estimates
     assert abs(lag.value - 9.0) < 4 * lag.std
+
+
+LATE_S = 0.6
+OFF = [("barge", 1, 3), pytest.param("coaster", 3, 4, marks=pytest.mark.thorough)]
+"""Ship, seed, runs."""
+
+
+def late(ship: str, seed: int, runs: int, *, off: float) -> Record:
+    """Orders that act late, on a ship whose parameters differ from the file's by so many shares of themselves."""
+    acting = {"delay_s": LATE_S, "acts_on": {"barge": 0b111, "coaster": 0b11}[ship]}
+    return hidden_record(ship, seed=seed, effects=acting, relative_std=off, batches=runs, samples=200)
+
+
+@pytest.mark.parametrize(("ship", "seed", "runs"), OFF)
+def test_parameters_of_the_file_that_are_off_are_told_beside_a_cause_with_their_own_gain(
+    ship: str, seed: int, runs: int
+) -> None:
+    """They are three times as far off as the file says; all of their gain was told to be that of the dead time."""
+    found = diagnose(vessel_of(ship, relative_std=0.05), late(ship, seed, runs, off=0.15))
+    delay, parameters = found.findings
+    assert {delay.cause, *delay.not_distinguishable_from} >= {"actuator_delay"}
+    assert parameters.cause == "parameters"
+    assert "parameters" not in delay.not_distinguishable_from
+    assert parameters.gain > 15 * delay.gain > 0
+    assert "actuators" in found.verdict
+    assert found.verdict.count("correct value") >= 2
+    assert not any(
+        "beyond their standard deviations" in note or "a sign of the correct" in note for note in found.notes
+    )
+    true = drawn_parameters(ship, Told(relative_std=0.15), np.random.default_rng(seed))
+    for one in parameters.estimates:
+        assert one.stated is not None
+        assert abs(one.value - one.stated) > 3 * 0.05 * abs(one.stated)
+        assert abs(one.value - true[one.name]) < 0.1 * abs(one.stated)
+    assert len(found.errors) == len(found.step_residuals) == 2
+
+
+@pytest.mark.parametrize(("ship", "seed", "runs"), OFF)
+def test_parameters_that_are_within_what_the_file_says_are_no_finding_beside_a_cause(
+    ship: str, seed: int, runs: int
+) -> None:
+    (delay,) = diagnose(vessel_of(ship, relative_std=0.05), late(ship, seed, runs, off=0.03)).findings
+    assert {delay.cause, *delay.not_distinguishable_from} >= {"actuator_delay"}

@@ -59,9 +59,7 @@ from expdesign.diagnosis.judgement import (
     harmless_beside_the_file,
     harms,
     losses_without,
-    parameters_alone,
     with_alternatives,
-    with_parameters_as_rival,
     without_harm,
     worth_writing,
 )
@@ -80,6 +78,12 @@ from expdesign.diagnosis.select import (
     select_forward,
     suspected_tests,
     with_honest_errors,
+)
+from expdesign.diagnosis.stated_parameters import (
+    WrongParameters,
+    parameters_alone,
+    with_parameters_as_rival,
+    wrong_parameters,
 )
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
@@ -115,11 +119,16 @@ class Selected:
     compared: Compared | None
     replaced: tuple[Step, ...]  # causes that the search found, in whose place one stands that predicts better
     suspected: tuple[Suspected, ...]  # tests of what was named before
+    wrong: WrongParameters | None  # parameters of the file that are wrong beside the causes
 
     @property
     def refused(self) -> tuple[Step, ...]:
         """Causes that improve simulations of held-out units and harm those of the data as they are."""
         return self.rest.kept.steps[len(self.kept.steps) :]
+
+    def is_named(self, step: Step) -> bool:
+        """Whether parameters that are told as wrong are all that a cause changes."""
+        return self.wrong is not None and {*step.chosen.keys} <= {*self.wrong.step.chosen.keys}
 
     @property
     def before(self) -> HeldOut:
@@ -128,6 +137,8 @@ class Selected:
 
     def compared_with(self, seed: int) -> tuple[HeldOut, bool]:
         """Errors that the first cause is compared with, and whether they are of the same fit without it."""
+        if self.wrong is not None:
+            return self.wrong.alone, False
         return compared_with(self.kept, self.held, self.re_estimated, seed)
 
 
@@ -188,6 +199,7 @@ def select_causes(
         compared=compared,
         replaced=() if compared is None else searched.steps,
         suspected=first,
+        wrong=None if compared else wrong_parameters(kept, held, validation, windows, seed, ship=ship),
     )
 
 
@@ -269,8 +281,9 @@ def diagnose(
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
     order = np.argsort(-losses_without(chosen.kept, chosen.held, chosen.validation, windows), kind="stable").tolist()
-    steps = [chosen.kept.steps[index] for index in order]
-    ranked = tuple(findings[index] for index in order)
+    beside = () if chosen.wrong is None else (chosen.wrong.step,)
+    steps = [*(chosen.kept.steps[index] for index in order), *beside]
+    ranked = (*(findings[index] for index in order), *findings[len(order) :])
     harmless = bool(findings) or not harms(ship, chosen.kept.last.ship, record)
     within = _gains_within_std(chosen, ship, seed) if harmless and not findings else ()
     refined = harmless and (steps or ship.stated_std or within)
@@ -358,7 +371,7 @@ def _signs(chosen: Selected, after: Accuracy, windows: Windows, seed: int) -> tu
     Their gain is against the same model without them, fitted as they are.
     """
     kept = {id(step.chosen.candidate) for step in chosen.rest.kept.steps}
-    rejected = [step for step in chosen.found.steps if id(step.chosen.candidate) not in kept]
+    rejected = [one for one in chosen.found.steps if id(one.chosen.candidate) not in kept and not chosen.is_named(one)]
     if not more_than_noise(after, windows).any():
         return ()
     found: dict[str, Lead] = {}
@@ -376,18 +389,14 @@ def _in_words(found: Sequence[Missing]) -> tuple[str, ...]:
 
 
 def _findings(chosen: Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
-    """Findings in the order of the selection."""
-    before = [chosen.compared_with(seed)[0], *chosen.held[1:]] if chosen.kept.steps else []
+    """Findings in the order of the selection, wrong parameters of the file last."""
+    kept, wrong = chosen.kept, chosen.wrong
+    before = [chosen.compared_with(seed)[0], *chosen.held[1:]] if kept.steps else []
+    found = [(step, (before[index], chosen.held[index + 1])) for index, step in enumerate(kept.steps)]
+    found += [] if wrong is None else [(wrong.step, (chosen.before, wrong.alone))]
     return tuple(
-        finding_of(
-            step,
-            chosen.kept.last,
-            (before[index], chosen.held[index + 1]),
-            seed,
-            windows,
-            would_tell_apart=_discriminating(step, proposals, windows),
-        )
-        for index, step in enumerate(chosen.kept.steps)
+        finding_of(step, kept.last, pair, seed, windows, would_tell_apart=_discriminating(step, proposals, windows))
+        for step, pair in found
     )
 
 
@@ -402,7 +411,8 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
 
 def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ...]:
     replaced = {id(step.chosen.candidate) for step in chosen.replaced}
-    others = tuple(step for step in chosen.found.steps if id(step.chosen.candidate) not in replaced)
+    left = (step for step in chosen.found.steps if not chosen.is_named(step))
+    others = tuple(step for step in left if id(step.chosen.candidate) not in replaced)
     rejected = notes_on_rejected(replace(chosen.found, steps=others), chosen.rest.kept, unit)
     if chosen.compared is not None and chosen.kept.steps:
         how = note_on_predictions(chosen.before, chosen.held[1], chosen.kept, chosen.replaced, seed)
@@ -414,10 +424,10 @@ def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ..
             *rejected,
         ]
         alone = parameters_alone(chosen.kept, chosen.held, chosen.validation)
-        if alone is not None:
+        if alone is not None and chosen.wrong is None:
             cause = missing_effect(chosen.kept.steps[0].chosen.candidate.cause)
             notes.append(note_on_parameters_alone(chosen.before, alone, chosen.held[1], cause, seed))
-        elif chosen.kept.first.keys:
+        elif alone is None and chosen.kept.first.keys:
             notes += note_on_nuisance(chosen.before, chosen.held[0], seed)
     notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))

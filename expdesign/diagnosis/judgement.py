@@ -14,19 +14,17 @@ from expdesign.diagnosis.fit import (
     AHEAD_S,
     LEAST_ERROR,
     CrossValidation,
-    Fit,
     HeldOut,
     counting_runs,
-    held_out_gain,
+    gains_for_certain,
     judged,
     leads_away,
-    prediction_gain,
     runs_of,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
-from expdesign.diagnosis.prediction_comparison import RE_ESTIMATED, Compared, ComparedCause, fitted_to_all
+from expdesign.diagnosis.prediction_comparison import Compared, ComparedCause, fitted_to_all
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Rival,
@@ -39,6 +37,7 @@ from expdesign.diagnosis.select import (
     with_runs_counted,
     without_step,
 )
+from expdesign.diagnosis.stated_parameters import or_parameters
 from expdesign.progress import Progress, within
 from expdesign.signals import Record
 from expdesign.values import Array
@@ -70,7 +69,7 @@ def errors_as_judged(
         known = fitted_ahead(found, windows, short, beside_stated=True)
     if known is not None:
         whole = [validation.of(one.last) for one in (found, known)]
-        if _gains_for_certain(whole, seed) or _gains_for_certain(_ahead(whole), seed):
+        if gains_for_certain(whole, seed) or gains_for_certain(_ahead(whole), seed):
             return known, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
     if found.steps and held[0].in_stretches:
         found = fitted_ahead(found, windows, short, beside_stated=False) or found
@@ -87,16 +86,10 @@ def _where_more_is_certain(
     if not found.steps or held[0].in_stretches or any(item.ahead is None for item in held):
         return held
     in_runs = improves_held_out(found, held, seed, windows)
-    if all(in_runs) or not _gains_for_certain(_ahead(held[:2]), seed):
+    if all(in_runs) or not gains_for_certain(_ahead(held[:2]), seed):
         return held
     in_stretches = improves_held_out(found, _ahead(held), seed, windows)
     return _ahead(held) if [*in_stretches, False].index(False) > in_runs.index(False) else held
-
-
-def _gains_for_certain(held: Sequence[HeldOut], seed: int) -> bool:
-    """Whether the second of two models gains, by an interval that excludes zero."""
-    _, (low, _) = held_out_gain(held[0], held[1], seed)
-    return low > 0.0
 
 
 def _ahead(held: Sequence[HeldOut]) -> list[HeldOut]:
@@ -160,7 +153,7 @@ def found_by_predictions(
         if re_estimated is not None and item.held.mean_fit < re_estimated.mean_fit:
             continue
         better_than = [*known, *([] if item.is_slow_weather else weather)]
-        if not all(held is not None and _gains_for_certain([held, item.held], seed) for held in better_than):
+        if not all(held is not None and gains_for_certain([held, item.held], seed) for held in better_than):
             continue
         chosen = None if harms(ship, item.fit.ship, record) else fitted_to_all(item, first, windows)
         if chosen is None:
@@ -179,52 +172,10 @@ def found_by_predictions(
         )
         left = tuple(test for test in kept.last_tests if test.candidate.cause != item.cause)
         found = replace(kept, steps=(step,), last=chosen.fit, last_tests=left, beside_stated=re_estimated is not None)
-        if re_estimated is not None and not _gains_for_certain([re_estimated, item.held], seed):
-            found = _or_parameters(found, kept.first, windows)
+        if re_estimated is not None and not gains_for_certain([re_estimated, item.held], seed):
+            found = or_parameters(found, kept.first, windows)
         return found, [compared.without, item.held]
     return None
-
-
-def parameters_alone(kept: Selection, held: Sequence[HeldOut], validation: CrossValidation) -> HeldOut | None:
-    """Errors of all parameters re-estimated without any cause, where they have a part in the gain of the first one.
-
-    A fit without any cause that needs parameters far beyond their standard deviations is no model that the file allows,
-    so gains are measured on the file as it is. Part of such a gain is then that of the parameters, which are fitted
-    beside the cause. None elsewhere.
-
-    Args:
-        held: errors on held-out units of the model before any cause, then after every one.
-        validation: of other fits.
-    """
-    exceeded = kept.steps and kept.first.keys and not kept.beside_stated and not within_stated_std(kept.first)
-    if not exceeded or only_nuisance(kept.steps[0], kept):
-        return None
-    return validation.of(kept.first).like(held[1])
-
-
-def with_parameters_as_rival(
-    kept: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows, seed: int
-) -> Selection:
-    """The causes, the first with all parameters as an alternative unless it gains for certain on them re-estimated.
-
-    It may gain in simulations, or in predictions from one sample to the next. Arguments as of `parameters_alone`.
-    """
-    alone = parameters_alone(kept, held, validation)
-    if alone is None or _gains_for_certain([alone, held[1]], seed):
-        return kept
-    share, (least, _) = prediction_gain(alone, held[1], windows, kept.steps[0].chosen.fit.noise)
-    certain = least > 0.0 and share >= SELECTION_TUNING.least_predicted
-    return kept if certain else _or_parameters(kept, kept.first, windows)
-
-
-def _or_parameters(kept: Selection, first: Fit, windows: Windows) -> Selection:
-    """The causes, all parameters as fitted before any of them an alternative to the first."""
-    step, *others = kept.steps
-    candidates = [item for item in open_candidates(first, windows) if item.cause == RE_ESTIMATED]
-    if not candidates or any(item.candidate.cause == RE_ESTIMATED for item in step.alternatives):
-        return kept
-    rival = Rival(candidate=max(candidates, key=lambda item: item.size), ship=first.ship, trails_by=0.0)
-    return replace(kept, steps=(replace(step, alternatives=(*step.alternatives, rival)), *others))
 
 
 def with_alternatives(kept: Selection, compared: Compared, seed: int) -> Selection:
@@ -257,7 +208,7 @@ def _no_worse(causes: Sequence[ComparedCause], held: HeldOut, seed: int) -> tupl
     return tuple(
         Rival(candidate=item.point.test.candidate, ship=item.fit.ship, trails_by=0.0)
         for item in causes
-        if not _gains_for_certain([item.held, held], seed)
+        if not gains_for_certain([item.held, held], seed)
     )
 
 
@@ -352,7 +303,7 @@ def worth_writing(
 
 def gains_on_other_runs(held: Sequence[HeldOut], seed: int) -> bool:
     """Whether the second of two models predicts runs that it was not fitted to better, for certain."""
-    return _gains_for_certain([item.on_other_runs() for item in held if item.on_other_runs is not None], seed)
+    return gains_for_certain([item.on_other_runs() for item in held if item.on_other_runs is not None], seed)
 
 
 def _re_estimates(kept: Selection) -> bool:

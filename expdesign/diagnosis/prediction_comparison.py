@@ -70,7 +70,7 @@ class ComparedCause:
     gain: float
     gain_interval: tuple[float, float]
     left: float  # by that model: mean fit less than perfect [points], of which gains are shares
-    p_value: float  # of the signed-rank test over stretches, times the number of causes that were compared
+    p_value: float  # of the signed-rank test over stretches, times the number of causes and of times that were tried
 
     @property
     def cause(self) -> str:
@@ -156,7 +156,7 @@ def compare_predictions(
     tried = [one for test in shortlist if (one := known[id(test)])]
     p_values = signed_rank_p_values(without, [held for *_, held in tried])
     found = [
-        _compared(*fitted, without, min(1.0, len(shortlist) * p_value), seed)
+        _compared(*fitted, without, min(1.0, len(shortlist) * _values_tried(fitted[0], candidates) * p_value), seed)
         for fitted, p_value in zip(tried, p_values, strict=True)
     ]
     causes = tuple(sorted(found, key=lambda item: -item.gain))
@@ -195,6 +195,12 @@ def _best_of_each_cause(tests: Sequence[ScoreTest]) -> list[ScoreTest]:
         if test.statistic >= least - SELECTION_TUNING.statistic_margin:
             found.setdefault(_kind(test.candidate), test)
     return [*found.values()][: SELECTION_TUNING.shortlist]
+
+
+def _values_tried(point: StartingPoint, candidates: Sequence[Candidate]) -> int:
+    """How many values of an effect were tried that the fit holds, as the time of a change: of what is held out, too."""
+    own = point.test.candidate
+    return 1 if own.grid is None else sum(one.cause == own.cause and {*one.free} == {*own.free} for one in candidates)
 
 
 def _kind(candidate: Candidate) -> str:

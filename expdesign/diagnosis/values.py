@@ -98,8 +98,8 @@ class Diagnosis:
     # before, after: accuracy of both on all batches, in sample
     before: Accuracy
     after: Accuracy
-    # by what the model of all loses on held-out data without each; each gain is relative to the model with the causes
-    # that were found before
+    # by what the model of all loses on held-out data without each, parameters that are wrong beside causes last; each
+    # gain is relative to the model with the causes that were found before, after such parameters
     findings: tuple[Finding, ...]
     verdict: str  # three sentences: what the simulation lacks, how sure that is, what to do
     unexplained: Unexplained | None  # what remains; None where the simulation explains much, or all but the noise

@@ -155,8 +155,9 @@ def verdict(
         sentences = [what, sure, "Use the extended vessel file, which has them"]
     elif unexplained is not None:
         what = "The simulation explains little of these data and no cause is certain"
-        lead = [f"; the best candidate is {_lead(one)} on {unexplained.unit} held out" for one in unexplained.leads]
-        sentences = [what, "".join([_capital(_fits(unexplained)), *lead[:1]]), MORE_DATA]
+        leads = _with_units(unexplained, signs, unit)
+        named = [f"; the best candidate is {_lead(one)} on {of} held out" for one, of in leads]
+        sentences = [what, "".join([_capital(_fits(unexplained)), *named[:1]]), MORE_DATA]
     elif signs:
         better = [f"; {_lead(lead)} improves nothing for certain on {unit} held out" for lead in signs if lead.gain > 0]
         sure = "".join([_accuracy(before), *better[:1]])
@@ -272,12 +273,17 @@ def remarks(
             if np.isfinite(share)
         ]
         found.append(f"A slowly varying force that nobody measured would take {listed(shares)}." if shares else "")
-    of_remainder = [] if unexplained is None else [(lead, unexplained.unit) for lead in unexplained.leads]
-    leads = {lead.cause: f"{_lead(lead)} on {of}" for lead, of in [*((sign, unit) for sign in signs), *of_remainder]
-             if lead.gain > 0.0}  # fmt: skip
+    leads = {lead.cause: f"{_lead(lead)} on {of}" for lead, of in _with_units(unexplained, signs, unit)}
     if leads:
         found.append(f"Not certain, by their gains on data held out: {listed([*leads.values()])}.")
     return tuple(text for text in found if text)
+
+
+def _with_units(unexplained: Unexplained | None, signs: Sequence[Lead], unit: str) -> list[tuple[Lead, str]]:
+    """Uncertain candidates that gain, the one that gains most first, each with what its gain is measured on."""
+    of_remainder = [] if unexplained is None else [(lead, unexplained.unit) for lead in unexplained.leads]
+    both = sorted([*((sign, unit) for sign in signs), *of_remainder], key=lambda pair: pair[0].gain)
+    return [*{lead.cause: (lead, of) for lead, of in both if lead.gain > 0.0}.values()][::-1]
 
 
 def _sentences(texts: Sequence[str]) -> str:
@@ -318,8 +324,7 @@ def _benefits(findings: Sequence[Finding], unit: str) -> str:
     if len(findings) == 1:
         it = "them" if lacking(findings[0]).startswith("the correct values") else "it"
         return f"Adding {it} {benefit(findings[0])} on {unit} held out of the fit"
-    first, *others = [f"{lacking(item)} {benefit(item)}" for item in findings]
-    return f"On {unit} held out of the fit, {listed([f'adding {first}', *others])}"
+    return f"On {unit} held out of the fit, {listed([f'adding {lacking(item)} {benefit(item)}' for item in findings])}"
 
 
 def accuracy_in_words(found: Accuracy) -> str:

@@ -27,6 +27,7 @@ from expdesign.diagnosis.fit.cross_validation import (
 from expdesign.diagnosis.fit.fit import (
     Fit,
     FitOptions,
+    beyond_stated_std,
     continuing,
     deviations_of,
     likeliest,
@@ -43,6 +44,7 @@ from expdesign.diagnosis.fit.held_out import (
     LEAST_ERROR,
     HeldOut,
     certain_reductions,
+    gains_for_certain,
     held_out_gain,
     judged,
     leads_away,

@@ -272,10 +272,16 @@ def deviations_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
 
 def within_stated_std(found: Fit) -> bool:
     """Whether all effects with a standard deviation in the vessel file are within it, by Bonferroni's inequality."""
+    return not beyond_stated_std(found)
+
+
+def beyond_stated_std(found: Fit) -> tuple[str, ...]:
+    """Effects that are not within their standard deviation in the vessel file, by Bonferroni's inequality."""
     whitening = _prior_whitening(found.ship, found.keys, found.free_count)
     apart = np.abs(whitening @ deviations_of(found.ship, found.keys))
     stated = int((np.diag(whitening) > 0).sum())
-    return bool((2.0 * scipy.special.ndtr(-apart) * max(stated, 1) > BEYOND_STD_LEVEL).all())
+    beyond = 2.0 * scipy.special.ndtr(-apart) * max(stated, 1) <= BEYOND_STD_LEVEL
+    return tuple(key for key, is_beyond in zip(found.keys, beyond.tolist(), strict=True) if is_beyond)
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:

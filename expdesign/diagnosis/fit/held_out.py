@@ -157,6 +157,12 @@ def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tu
     return float(gain), (float(low), min(float(high), 100.0 - before.mean_fit))
 
 
+def gains_for_certain(held: Sequence[HeldOut], seed: int) -> bool:
+    """Whether the second of two models gains, by an interval that excludes zero."""
+    _, (low, _) = held_out_gain(held[0], held[1], seed)
+    return low > 0.0
+
+
 def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Array, Array, Array]:
     """(n,) share by which the error of every output falls, and the ends of its interval of 95 %.
 

@@ -18,6 +18,7 @@ from expdesign.diagnosis.select.selection import (
     fitted_ahead,
     p_value_between_runs,
     redundant_step,
+    wald_p_value,
     with_runs_counted,
     without_step,
 )
