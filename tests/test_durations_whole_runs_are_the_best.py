@@ -1,13 +1,22 @@
 """Whole runs fit the time, inform about every parameter, and are optimal or nearly so."""
 
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from design_case import WIND, duration_problem, one_line, random_matrices, scored_example, vessel
-from expdesign.durations import DurationDesign, DurationProblem, build_durations, solve_durations, with_repeats
+from expdesign.durations import (
+    DurationDesign,
+    DurationProblem,
+    build_durations,
+    rounding,
+    solve_durations,
+    with_repeats,
+)
 from expdesign.durations.certificate import scaled
+from expdesign.durations.rounding import _completed, _Search
 from expdesign.errors import NoAnswer, NotInformative
 from expdesign.values import Array
 
@@ -176,3 +185,36 @@ def test_a_problem_without_information_about_a_parameter_has_no_answer():
     with pytest.raises(NotInformative, match="do not inform about every parameter") as caught:
         solve_durations(duration_problem([np.diag([1.0, 0.0]), np.diag([2.0, 0.0])]))
     assert one_line(caught.value)
+
+
+@pytest.mark.parametrize("draw", range(12))
+def test_runs_that_lack_something_get_what_they_lack_within_the_limits(draw: int):
+    """Some runs of one primitive are asked for; others give way to them where the time is full."""
+    rng = np.random.default_rng(400 + draw)
+    problem = small_problem(draw, equal=bool(draw % 2))
+    fractions = rng.dirichlet(np.ones(len(problem.run_s)))
+    search = _Search.of(problem, fractions)
+    short = int(np.argmin(problem.run_s))
+    asked = int(problem.total_s / problem.run_s[short] / 2.0)
+
+    def shortfall(shares: Array) -> float:
+        return max(0.0, asked * search.shares[short] - float(shares[short]) - 1e-12)
+
+    begun = search.filled_up(np.where(np.arange(len(fractions)) == short, 0, search.rounded(fractions)))
+    begun = np.where(np.arange(len(fractions)) == short, 0, begun)
+    found = _completed(search, begun, shortfall)
+    assert shortfall(begun * search.shares) > 0.0
+    assert found[short] == asked
+    assert search.allowed(found)
+    assert _completed(search, found, shortfall) is found
+
+
+def test_regressors_that_merge_are_told_of_the_shares_that_whole_runs_take(monkeypatch: pytest.MonkeyPatch):
+    problem = duration_problem(np.tile(np.eye(2), (3, 1, 1)), run_s=[20.0, 30.0, 50.0], total_s=200.0)
+    asked: list[Array] = []
+    monkeypatch.setattr(rounding, "merged_nuisance", lambda _, shares: asked.append(shares) or [("one", "other")])
+    told = rounding.note_on_runs(
+        SimpleNamespace(nuisance=True, run_s=problem.run_s, total_s=200.0), np.array([2, 1, 2])
+    )
+    assert asked[0] == pytest.approx([0.2, 0.15, 0.5])
+    assert told.endswith("the estimator merges them: one with other")

@@ -20,6 +20,7 @@ from expdesign.estimation.noise.covariance import SPECTRUM_MISFIT, score_covaria
 from expdesign.estimation.regression import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start
+from expdesign.estimation.solve import sandwich
 from expdesign.estimation.solve.sandwich import WHITE_TEST_LEVEL, changing_variance, widening
 from expdesign.estimation.solve.solution import Weighting, solve_iv
 from expdesign.simulation import Variation
@@ -218,6 +219,33 @@ def test_variance_that_changes_with_the_instruments_is_allowed_for() -> None:
         regression = single_output(u, u[:, 0] * rng.normal(size=1500), parameters=("theta",))
         stated.append(float(solve_iv(regression, u[:, None, :].copy(), Weighting()).covariance[0, 0]))
     assert abs(np.mean(stated) - exact) < 4 * np.std(stated) / 10 + 0.01 * exact
+
+
+def test_what_takes_nothing_from_the_residuals_has_no_changing_variance() -> None:
+    rng = np.random.default_rng(47)
+    W, steps = rng.standard_normal((500, 1, 2)) * [1.0, 0.0], np.arange(500)
+    factors = changing_variance(W, W[:, 0, :1] * rng.standard_normal((500, 1)), np.zeros(500, dtype=np.int64), steps)
+    assert factors[0] > 1.2
+    assert factors[1] == 1.0
+
+
+def test_of_noise_of_another_shape_the_larger_of_both_estimates_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parameter by parameter: by the parts of noise, and by long-run sums."""
+    rng, samples = np.random.default_rng(48), 2000
+    swell = np.zeros(samples)
+    for k, e in enumerate(rng.normal(size=samples)):
+        swell[k] = e + (1.9 * np.cos(2 * np.pi / 10) * swell[k - 1] - 0.9 * swell[k - 2] if k > 1 else 0.0)
+    u = rng.normal(size=(samples, 2))
+    regression = single_output(u, u.sum(axis=1) + swell, parameters=("one", "two"))
+
+    def stated(robust: np.ndarray) -> np.ndarray:
+        monkeypatch.setattr(sandwich, "_summed", lambda *_, **__: (np.diag(robust), 0))
+        return np.diag(solve_iv(regression, u[:, None, :].copy(), Weighting()).covariance)
+
+    by_parts, factor = stated(np.zeros(2)), samples / (samples - 2.0)
+    assert (by_parts > 0).all()
+    found = stated(by_parts * [0.25, 4.0])
+    assert found == pytest.approx(by_parts * [1.0, 4.0 * factor], rel=1e-9)
 
 
 def test_equations_with_instruments_leave_out_the_sample_that_instruments_start_from() -> None:

@@ -10,7 +10,21 @@ import pytest
 import scipy
 
 from expdesign.monitoring import Calibration, Rules, State, calibrate, threshold, watch
-from expdesign.monitoring.cusum import SURELY, TUNED_TO, _less, _scattered, _summed, _waited, estimates, soonest
+from expdesign.monitoring.calibration import ROUGHER
+from expdesign.monitoring.cusum import (
+    ALIKE,
+    SURELY,
+    TUNED_TO,
+    WEATHER_LIMIT,
+    _counted,
+    _less,
+    _rougher_by,
+    _scattered,
+    _summed,
+    _waited,
+    estimates,
+    soonest,
+)
 from expdesign.monitoring.force import Judged
 from monitoring_case import CHANGES, STRETCH_S, drawn_columns, drawn_grams, grams_from
 
@@ -66,6 +80,32 @@ def test_a_change_that_is_not_watched_has_no_sum(calibration: Calibration) -> No
     state, step = _summed(state, one, state, 0.0, calibration)
     assert (state.ratios > 0).tolist() == [True, False, False, False, False, False, True, False]
     assert step.change == 2
+
+
+def test_every_stretch_is_judged_or_left_out_and_time_beyond_the_reference_adds_up_while_it_lasts(
+    calibration: Calibration,
+) -> None:
+    state, grams = State.begun(calibration, time_s=0.0), drawn_grams(1, seed=5)
+    one, seen = stretch(np.zeros(CHANGES), np.eye(CHANGES), len(state.known.mean)), []
+    for beyond in (False, True, True, False, True):
+        weather = np.full(len(state.weather), 2.0 * WEATHER_LIMIT if beyond else 1.0)
+        state = _counted(state, one, weather, calibration, 60.0, int(grams.kind[0]), grams.budget[0])
+        seen.append((state.judged_s, state.left_out_s, state.beyond_s, state.load.judged))
+    assert seen == [(60, 0, 0, 1), (60, 60, 60, 2), (60, 120, 120, 3), (120, 120, 0, 4), (120, 180, 60, 5)]
+
+
+@pytest.mark.parametrize("alike", [(True, False), (False, True), (True, True)])
+def test_of_rougher_weathers_those_count_that_a_change_resembles_and_winds(
+    calibration: Calibration, alike: tuple[bool, bool]
+) -> None:
+    """Whatever the unit of the weights, so that a share of the largest decides."""
+    weights = calibration.weights.copy()
+    weights[2, -2:] = 5.0 * np.where(alike, 1.0, ALIKE / 2.0)
+    calibration, state = replace(calibration, weights=weights), State.begun(calibration, time_s=0.0)
+    counts = [*np.repeat(alike, len(ROUGHER)), *[True] * (len(state.rougher) - 2 * len(ROUGHER))]
+    for gains in np.random.default_rng(6).normal(size=(20, len(state.rougher))):
+        state = replace(state, rougher=state.sums.rougher[2] + gains)
+        assert _rougher_by(state, 2, calibration) == pytest.approx(gains[np.array(counts)].max())
 
 
 def test_the_threshold_is_never_below_that_of_one_sum_a_stretch() -> None:

@@ -11,6 +11,8 @@ import shapely
 from expdesign.plan.bounds.branch_and_bound import (
     CELL_HEADINGS,
     GoalTimes,
+    Saving,
+    _near_corners,
     first_cells,
     goal_times,
     grown_times,
@@ -18,7 +20,7 @@ from expdesign.plan.bounds.branch_and_bound import (
     spread_m,
     time_saved_s,
 )
-from expdesign.plan.bounds.displacement import Headway, displacement_of, track_of
+from expdesign.plan.bounds.displacement import SIDES, Headway, displacement_of, track_of
 from expdesign.plan.chart.visibility_graph import build_visibility_graph
 from expdesign.simulation import Environment
 from plan_case import primitive, random_path, ship
@@ -87,6 +89,34 @@ def test_times_to_the_goal_are_those_of_the_fastest_paths():
         expected = [graph.least_cost(point, goal, headway.seconds) for point in points]
         np.testing.assert_allclose(times.at(points), expected, atol=1e-6)
     assert np.isinf(times.at(np.array([[1000.0, 0.0]]))).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cells_are_kept_where_a_corner_may_be_in_the_hull_of_the_track(seed):
+    """By every side of the hull, with the corner turned into the axes of the run by complex numbers."""
+    rng = np.random.default_rng(seed)
+    track = track_of(half_turn(), ship(), rng.uniform(-0.05, 0.05, 2))
+    cells = rng.uniform([-90, -90, 0], [90, 90, 2 * np.pi], (3000, 3))
+    corners, farther_m = rng.uniform(-60, 60, (4, 2)), rng.uniform(1.0, 6.0)
+    away = (corners @ [1, 1j]) - (cells[:, :2] @ [1, 1j])[:, None]
+    turned = away * np.exp(-1j * cells[:, 2])[:, None]
+    along = turned.real[..., None] * SIDES[:, 0] + turned.imag[..., None] * SIDES[:, 1]
+    near = (along <= track.hull_m + track.drift_m + farther_m).all(axis=-1).any(axis=1)
+    assert 0.01 < near.mean() < 0.5
+    np.testing.assert_array_equal(_near_corners(track, cells, corners, farther_m), cells[near])
+
+
+@pytest.mark.parametrize("current", [(0.0, 0.0), (0.3, -0.4)])
+def test_what_a_cell_may_save_beyond_its_middle_is_its_spread_at_the_slowest_speed_over_ground(current):
+    """Dead against the current, at both ends of the run."""
+    headway = Headway(speed_mps=SPEED, current_to=np.array(current))
+    water = shapely.box(-100, -100, 100, 100)
+    times = goal_times(build_visibility_graph(water), np.zeros(2), headway)
+    saving = Saving(track=track_of(half_turn(), ship(), headway.current_to), times=times, water=water, cell_m=5.0)
+    courses = np.linspace(0, 2 * np.pi, 721)
+    slowest = headway.seconds(unit(courses)).max()
+    assert saving._slowness == pytest.approx(slowest, rel=1e-4)
+    assert saving._slowness >= slowest - 1e-12
 
 
 def test_in_open_water_a_run_saves_what_its_chord_takes():
