@@ -10,7 +10,15 @@ import pytest
 import shapely
 
 from expdesign.plan.values import Leg, SailedTrial
-from expdesign.plan.verify import _limit_excess, hull_clearance, verify_plan
+from expdesign.plan.verify import (
+    ENTRY_TOLERANCE,
+    _end_problems,
+    _entry_problems,
+    _limit_excess,
+    _standing_problems,
+    hull_clearance,
+    verify_plan,
+)
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, simulate
 from expdesign.vessel import Limit
@@ -211,3 +219,57 @@ def test_what_passes_a_limit_or_rate_counts_as_a_share_of_the_range(low: float, 
     if np.isfinite(high):
         for beyond in (high + 0.5, low - 0.5):
             assert excess(*np.linspace(1.0, beyond, 9)) == (pytest.approx(0.5 / span), "n1 passes its limit")
+
+
+HEADING, CURRENT_TO = 0.6, np.array([0.4, -0.3])
+
+
+def flowing() -> np.ndarray:
+    """(3,) of a ship at rest in the current, along her axes."""
+    c, s = np.cos(HEADING), np.sin(HEADING)
+    north, east = CURRENT_TO
+    return np.array([c * north + s * east, c * east - s * north, 0.0])
+
+
+def moved(*velocities: np.ndarray) -> Trajectory:
+    pose = np.tile([5.0, -7.0, HEADING], (len(velocities), 1))
+    return Trajectory(sample_time_s=1.0, pose=pose, velocity=np.array(velocities))
+
+
+def test_a_run_enters_with_its_velocity_through_the_water_in_any_current():
+    entry, environment = np.array([1.0, 0.2, 0.05]), replace(CALM, current_to=CURRENT_TO)
+    legs, runs = [Leg(kind="primitive", name="go", first=0, last=1)], {"go": SimpleNamespace(entry_velocity=entry)}
+    fastest = flowing() + np.array([2.0, 1.0, 0.1])
+    sound = moved(flowing() + entry, fastest)
+    assert _entry_problems(environment, sound, legs, runs) == []  # type: ignore[arg-type]
+    for column in range(3):
+        off = 2.0 * ENTRY_TOLERANCE * abs(fastest[column])
+        wrong = moved(flowing() + entry + off * np.eye(3)[column], fastest)
+        (found,) = _entry_problems(environment, wrong, legs, runs)  # type: ignore[arg-type]
+        assert f"begins {2.0 * ENTRY_TOLERANCE:.1%} off its entry" in found
+    assert _entry_problems(environment, moved(entry, fastest), legs, runs)  # type: ignore[arg-type]
+
+
+def test_a_plan_under_way_begins_as_she_moves_and_ends_at_rest_in_the_water():
+    environment, begin = replace(CALM, current_to=CURRENT_TO), np.array([1.5, 0.1, 0.02])
+    ends = (np.array([5.0, -7.0, HEADING]),) * 2
+
+    def problems(*velocities: np.ndarray, under_way: np.ndarray | None) -> list[str]:
+        return _end_problems(ship(), environment, moved(*velocities), ends, under_way)
+
+    assert problems(begin, flowing(), under_way=begin) == []
+    assert problems(flowing(), begin, flowing(), under_way=None) == []
+    (late,) = problems(flowing(), begin, flowing(), under_way=begin)
+    assert "off the start" in late
+    (running,) = problems(begin, begin, under_way=begin)
+    assert "off the goal" in running
+    assert f"at {np.hypot(*(begin - flowing())[:2]):.3f} m/s through the water" in running
+
+
+def test_what_answers_late_is_told_with_its_first_command_and_what_stood():
+    late, prompt = SimpleNamespace(follows=False), SimpleNamespace(follows=True)
+    vessel = SimpleNamespace(responses=(late, prompt))
+    commands = Commands(sample_time_s=1.0, names=("n1", "n2"), values=np.array([[3.0, 4.0], [5.0, 6.0]]))
+    (told,) = _standing_problems(vessel, commands, np.array([1.0, 1.0]))  # type: ignore[arg-type]
+    assert told == "n1 is commanded 3 at once, expected 1 for a sample, as it answers late"
+    assert _standing_problems(vessel, commands, np.array([3.0, 1.0])) == []  # type: ignore[arg-type]
