@@ -12,8 +12,10 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.control import APPROACH_HULLS
 from expdesign.plan.control.ships import capability
-from expdesign.plan.legs import LegTask, LegWater
-from expdesign.plan.legs.helm import _shortest_first, displaced, recover
+from expdesign.plan.legs import LegTask, LegWater, _casadi
+from expdesign.plan.legs.helm import _shortest_first
+from expdesign.plan.legs.problem import LegProblem
+from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.plan.values import WorkBudget
 from expdesign.scenario import load_area, load_vessel
 from expdesign.signals import Commands
@@ -213,3 +215,64 @@ def test_a_leg_without_room_to_gather_speed_is_hardly_tried(hulls: float, enough
     )
     assert (find_leg(task, water) is not None) == enough
     assert task.budget.spent_s < 5.0
+
+
+def test_what_ipopt_leaves_near_an_answer_in_free_time_is_a_guess_and_nothing_else_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """About an answer it may go to and fro until its iterations end; what comes of the guess is sailed exactly."""
+    water, left = open_water(coaster()), list[tuple[bool, float, bool]]()
+    vessel, whole = water.vessel, _casadi.Program.solve
+
+    def told(program: _casadi.Program, problem: LegProblem, step_s: float) -> tuple[LegProblem, float] | None:
+        answer, fresh = whole(program, problem, step_s), not problem.budget.exhausted
+        outcome = program.solver.stats() if fresh or answer is not None else {"success": True}
+        if not outcome["success"]:
+            left.append((program.free, outcome["iterations"]["inf_pr"][-1], answer is not None))
+        return answer
+
+    monkeypatch.setattr(_casadi.Program, "solve", told)
+    monkeypatch.setattr(_casadi, "ITERATIONS", 25)  # the fastest motion takes 81
+    _casadi._program.cache_clear()
+    ahead, rest = steady_ahead(vessel, 0.8 * water.ship.transit_speed_mps), np.zeros(len(vessel.limits))
+    task = LegTask(
+        start=np.array([0.0, 0.0, 0.0, *ahead.velocity]),
+        end=np.array([12 * vessel.length_m, 6 * vessel.length_m, 0.5, 0.0, 0.0, 0.0]),
+        start_inputs=ahead.inputs,
+        end_inputs=rest,
+        seed=1,
+        budget=WorkBudget(most_s=8.0),
+    )
+    try:
+        find_leg(task, water)
+    finally:
+        _casadi._program.cache_clear()
+    assert {free for free, _, _ in left} == {True, False}
+    assert {taken for _, _, taken in left} == {True, False}
+    for free, miss, taken in left:
+        assert taken == (free and miss < 0.03)
+
+
+@pytest.mark.parametrize("to", ["run", "rest"])
+def test_a_ship_that_goes_astern_stops_and_goes_on(to: str) -> None:
+    """Her thrust ahead stops her: what a run leaves her with is no reason that no leg leads on."""
+    water = open_water(coaster())
+    vessel, approach = water.vessel, water.ship.approach
+    ahead, rest = steady_ahead(vessel, 0.8 * water.ship.transit_speed_mps), np.zeros(len(vessel.limits))
+    back = np.array(approach.helm.inputs(-1.0, approach.angle_rad))
+    count = int(400.0 / vessel.sample_time_s)
+    astern = water.states(np.r_[0.0, 0.0, 0.0, ahead.velocity], np.tile(back, (count, 1)), ahead.inputs[None])[-1, 3:]
+    assert astern[0] < -0.5 * water.ship.transit_speed_mps
+    velocity, inputs = (ahead.velocity, ahead.inputs) if to == "run" else (np.zeros(3), rest)
+    task = LegTask(
+        start=np.r_[0.0, 0.0, 0.0, astern],
+        end=np.array([16 * vessel.length_m, 4 * vessel.length_m, 0.4, *velocity]),
+        start_inputs=back,
+        end_inputs=inputs,
+        seed=1,
+        budget=WorkBudget(most_s=12.0),
+    )
+    values = find_leg(task, water)
+    assert values is not None
+    surge = water.sail(task.start, values, task.past).velocity[:, 0]
+    assert np.sum(np.diff(np.sign(surge[surge != 0.0])) != 0) <= 2  # she does not go astern again, but for the stop

@@ -3,7 +3,8 @@
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.agile import agile_leg, free_leg
 from expdesign.plan.legs.dubins import curved_leg
-from expdesign.plan.legs.helm import displaced, helm_leg, recover
+from expdesign.plan.legs.helm import helm_leg
+from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.plan.legs.water import (
     BEYOND_ENDS,
     FoundLeg,

@@ -33,6 +33,9 @@ SMALLNESS = 1e-4  # weight of squared commands: decides between commands that gi
 FREE_SAMPLES = (0.2, 3.0)  # least and largest time between samples while it is free, in sample times
 SETTLED = 1e-4  # miss of what lagging actuators deliver at the end, relative to the largest
 ITERATIONS = 100  # of IPOPT at most
+# largest miss at a node, in scaled states, of answers in free time that count where IPOPT's iterations ended: the next
+# program is only guessed from them, and about a good one IPOPT often goes to and fro
+CLOSE = 0.03
 CORNERED = 4  # iterations that IPOPT spends about a good answer before it is taken, where the model has corners
 PROGRAMS = 24  # nonlinear programs kept built
 
@@ -254,12 +257,18 @@ class Program:
         problem.budget.optimised(outcome["iter_count"], j * self.block)
         if outcome["return_status"] == "NonIpopt_Exception_Thrown":
             raise KeyboardInterrupt  # the only exception there can be, as nothing in the program calls back to Python
-        if not outcome["success"]:
+        if not outcome["success"] and not (self.free and _near(outcome)):
             return None
         values = np.asarray(answer["x"]).ravel()
         states = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
         inputs = values[6 * (j + 1) : (6 + m) * (j + 1)].reshape(j + 1, m) * self.input_scale
         return replace(problem, states=states, inputs=inputs), float(values[-1])
+
+
+def _near(outcome: dict[str, Any]) -> bool:
+    """Whether IPOPT used up its iterations near an answer."""
+    ended = outcome["return_status"] == "Maximum_Iterations_Exceeded"
+    return bool(ended and outcome["iterations"]["inf_pr"][-1] < CLOSE)
 
 
 @dataclass(frozen=True)

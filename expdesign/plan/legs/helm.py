@@ -12,18 +12,18 @@ IPOPT sometimes ends without an answer for a leg of a hundred hull lengths.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import APPROACH_HULLS, SETTLING_HULLS, Capability, HelmShip
+from expdesign.plan.control import APPROACH_HULLS, SETTLING_HULLS, HelmShip
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
+from expdesign.plan.legs.recovery import STRAIGHT_OFF_HULLS, Recovery, recover
 from expdesign.plan.legs.water import (
     ARRIVAL,
     FoundLeg,
@@ -37,7 +37,7 @@ from expdesign.plan.legs.water import (
 )
 from expdesign.simulation import Helm, to_body
 from expdesign.values import Array, seal
-from expdesign.vessel import NUMPY, Vessel, within_limits
+from expdesign.vessel import NUMPY, Vessel
 
 SLOW_SHARE = 0.3  # transit speeds below which a helm-steered ship is about to accelerate from rest or to stop
 # shares tried of `straight_off_hulls`, of the hull lengths to settle before a run-up, and of the stopping distance
@@ -53,65 +53,10 @@ STRAIGHTS = (
 ROOM_SHARES = (1.0, 0.25)
 HELM_NODE = 0.25  # time between nodes of helm-steered legs, in that of a hull length at transit speed
 EASED_HULLS = 1.0  # hull lengths over which their first guess eases into turns
-STRAIGHT_OFF_HULLS = 1.0  # straight before the first turn, as the helm takes that long to act
 TRANSIT_HULLS = 20.0  # shortest straight that is sailed with constant commands, in hull lengths
 TRANSIT_ENDS_HULLS = 6.0  # of straights before and after it that are optimised with the rest of the leg
 STRAIGHT_RAD = 1e-6  # change of course from point to point of a path from which on it bends
 HEADING_ROUNDS = 8  # of the search for the heading that makes good a course in a current
-COUNTER_HELM = 3.0  # helm against a residual turn, per yaw rate, in times of a hull length at transit speed
-# yaw rate in that a hull length before, above which counter helm does little more: the sway of a ship that is unstable
-# on her course keeps her turning slowly, for many lengths
-LITTLE_FELL = 0.5
-RECOVERED_SHARE = 0.05  # yaw rate at which the ship has recovered, in that of a leg's turns
-RECOVERY_HULLS = 8.0  # time after which a recovery ends in any case, in that of a hull length at transit speed
-
-
-# Recovery of a helm-steered ship from a run: counter helm ends the turn, the engines go to transit speed.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Recovery:
-    """From a state until the ship goes straight."""
-
-    states: Array  # (k + 1, 6) at every sample
-    commands: Array  # (k, m)
-
-    def __post_init__(self) -> None:
-        seal(self, states="n 6", commands="k m")
-
-
-def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recovery:
-    """End the turn of a ship at a state (6,) after commands (h, m); empty where it does not turn."""
-    vessel, approach = water.vessel, ship.approach
-    pace_s, swing = vessel.length_m / ship.transit_speed_mps, ship.transit_speed_mps / ship.turning_radius_m
-    hardest = approach.helm.hardest(approach.drive) - abs(approach.angle_rad)
-    states, rows, turning = [np.asarray(state)], [past[-1]], list[float]()  # rates since the helm has come over
-    count = max(1, round(pace_s / vessel.sample_time_s))
-    while abs(states[-1][5]) > RECOVERED_SHARE * swing and len(states) * vessel.sample_time_s < RECOVERY_HULLS * pace_s:
-        against = float(np.clip(COUNTER_HELM * pace_s * states[-1][5], -hardest, hardest))
-        desired = np.array(approach.helm.inputs(approach.drive, approach.angle_rad - approach.starboard * against))
-        desired = nearest_turns(vessel, desired, rows[-1])
-        row = within_limits(vessel.actuators, desired[None], sample_time_s=vessel.sample_time_s, before=rows[-1])
-        given = past if water.prompt else water.remembered(np.concatenate([past, *(row[None] for row in rows[1:])]))
-        states.append(water.states(states[-1], row, given)[-1])
-        rows.append(row[0])
-        turning += [abs(states[-1][5])] if np.allclose(row, desired) else []
-        if len(turning) > count and turning[-1] > LITTLE_FELL * turning[-1 - count]:
-            break
-    return Recovery(states=np.array(states), commands=np.array(rows[1:]).reshape(-1, len(vessel.limits)))
-
-
-def displaced(recovery: Recovery, ship: Capability, *, sample_time_s: float, hull_m: float) -> Array:
-    """(4,) displacement until the ship can be in any turn: recovery, and a straight while the helm takes effect.
-
-    Distance ahead and to starboard [m], course at its end from the first heading [rad], and time [s].
-    """
-    first, last = recovery.states[0], recovery.states[-1]
-    c, s = math.cos(first[2]), math.sin(first[2])
-    course = last[2] + (math.atan2(last[4], last[3]) if last[3] > 0 else 0.0)
-    north, east = last[:2] - first[:2] + STRAIGHT_OFF_HULLS * hull_m * np.array([math.cos(course), math.sin(course)])
-    time_s = len(recovery.commands) * sample_time_s + STRAIGHT_OFF_HULLS * hull_m / ship.transit_speed_mps
-    return np.array([north * c + east * s, east * c - north * s, course - first[2], time_s])
 
 
 # The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
