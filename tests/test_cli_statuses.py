@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import MISSING
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import pytest
 import expdesign.workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan
+from expdesign.requests import COMMANDS, Command
 
 ASLEEP = """
 import sys
@@ -106,6 +108,19 @@ def test_debugging_shows_where_a_defect_is(monkeypatch: pytest.MonkeyPatch, caps
 def test_a_typing_mistake_is_wrong_input(capsys: pytest.CaptureFixture[str], arguments: list[str], named: str) -> None:
     assert main(arguments) == 2
     assert named in only_line(capsys)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+def test_what_is_missing_is_named_with_its_meaning(command: Command, capsys: pytest.CaptureFixture[str]) -> None:
+    needed = [one for one in command.request.asked() if one.default is MISSING]
+    given: list[str] = []
+    for one in needed:
+        assert main([command.name, *given]) == 2
+        line = only_line(capsys)
+        assert line.startswith("Missing "), line
+        meaning = one.typed.help.split(".")[0]
+        assert meaning[1:30] in line.replace("\\", ""), line
+        given += [*([one.flag] if one.flag else []), "1"]
 
 
 @pytest.mark.parametrize("below", ["", "deeper/still"])

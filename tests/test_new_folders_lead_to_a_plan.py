@@ -1,6 +1,8 @@
 """`new` makes a folder of each kind whose trial is planned and verified, and says what acts in it and what does not."""
 
 import json
+import re
+import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -43,6 +45,17 @@ def test_a_folder_of_each_kind_is_whole_and_its_own(kind: str, tmp_path: Path) -
     assert 100 < height_m / case.vessel.length_m < 120
 
 
+def test_commands_that_are_shown_can_be_typed_whatever_the_folder_is_called(tmp_path: Path) -> None:
+    folder = tmp_path / "Fahrt 1 + 2"
+    outcome = new(folder)
+    (then,) = (value for key, value in outcome.document.facts.items() if key == "then")
+    assert shlex.split(then) == ["expdesign", "run", str(folder / "scenario.toml")]
+    shown = re.findall("`(expdesign .*?)`", (folder / "README.md").read_text("utf-8"))
+    words = [word for line in shown for word in shlex.split(line)]
+    named = [word for word in words if "Fahrt" in word]
+    assert named == [f"{folder.name}/{name}.toml" for name in ("scenario", "vessel")]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_candidates_of_each_kind_tell_of_every_parameter(kind: str, tmp_path: Path) -> None:
     case = load_scenario(new(tmp_path / kind, kind=kind).files[0])
@@ -57,6 +70,9 @@ def test_a_folder_that_exists_and_a_kind_that_does_not_are_refused(tmp_path: Pat
     assert main(["new", str(there), "--quiet"]) == 2
     assert "exists, expected the name of a folder to be made" in capsys.readouterr().err
     assert list(there.iterdir()) == []
+    assert main(["new", str(tmp_path / "half & half"), "--quiet"]) == 2
+    assert "the folder's name is the scenario's and is 'half & half', expected at most 80" in capsys.readouterr().err
+    assert not (tmp_path / "half & half").exists()
     assert main(["new", str(tmp_path / "other"), "--kind", "submarine", "--quiet"]) == 2
     assert "submarine" in (said := capsys.readouterr().err)
     assert all(kind in said for kind in KINDS)

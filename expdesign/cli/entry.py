@@ -35,6 +35,7 @@ LISTS = {
 """Options that take several values, and whether these are files."""
 LINE_END = re.compile(r"(?<!\n)\n(?!\n|Example:)")
 """Within a paragraph."""
+ESCAPED = escape("[a]").removesuffix("a]")
 Program = TypeVar("Program")
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 
@@ -141,8 +142,10 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _usage(error: typer.TyperException) -> str:
-    context = getattr(error, "ctx", None)
-    return f"{error.format_message().rstrip('.')} (see {context.command_path if context else 'expdesign'} --help)"
+    context, message = getattr(error, "ctx", None), error.format_message().rstrip(".")
+    help_text = getattr(getattr(error, "param", None), "help", None) if message.startswith("Missing") else None
+    what = f": {help_text[0].lower()}{help_text[1:].rstrip('.')}" if help_text else ""
+    return f"{message}{what.replace(ESCAPED, '[')} (see {context.command_path if context else 'expdesign'} --help)"
 
 
 def _defect(error: Exception) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -267,7 +268,12 @@ def import_document(content: ImportContent, folder: Path) -> Document:
             ),
             *parts,
             *(
-                [section("Next", Listing((f"expdesign estimate {folder} --vessel {content.vessel}",)))]
+                [
+                    section(
+                        "Next",
+                        Listing((shlex.join(["expdesign", "estimate", str(folder), "--vessel", content.vessel]),)),
+                    )
+                ]
                 if steered
                 else []
             ),

@@ -9,7 +9,7 @@ a list count from 1, as in ``actuators[2].speed_max_rps``), the value found and 
 from expdesign.scenario.card_file import load_card
 from expdesign.scenario.charts import load_area
 from expdesign.scenario.design_file import load_repeats
-from expdesign.scenario.dictionaries import LoadCases, load_cases, load_dictionary
+from expdesign.scenario.dictionaries import NAME, NAME_RULE, LoadCases, load_cases, load_dictionary
 from expdesign.scenario.import_files import INSTRUMENTS, equipped_vessel, load_mapping
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import Scenario

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from shlex import quote
 from typing import Any
 
 from nicegui import ui
@@ -48,7 +49,9 @@ class _Manoeuvres:
         with self.answer:
             ui.label("Simulating the dictionary…").classes("quiet")
         out = self.site.out_of(self.scenario)
-        spelled(f"expdesign durations {self.scenario}", f"writes {out}/durations.json; {self.scenario} has [design]")
+        spelled(
+            f"expdesign durations {quote(self.scenario)}", f"writes {out}/durations.json; {self.scenario} has [design]"
+        )
 
     def _later(self) -> None:
         self.watched.show(self.scenario)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from typing import Any
 from urllib.parse import urlencode
 
@@ -114,7 +115,7 @@ class _Sea:
             )
         with ui.expansion("The area file as numbers").classes("table"):
             Form(self.site.folder, self.area, AreaTable, changed=self._fill_later).draw(skip=("no_go",))
-        spelled(f"expdesign run {self.scenario}", f"reads {self.scenario} and {self.area}")
+        spelled(f"expdesign run {quote(self.scenario)}", f"reads {self.scenario} and {self.area}")
 
     def _ask_outlines(self) -> None:
         """What the outlines of a chart without layers enclose."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
 from pathlib import Path
 from urllib.parse import quote
@@ -55,7 +56,7 @@ def register_ship(site: Site) -> None:
                     site.folder, vessel, VesselTable, kinds={"actuators": ACTUATOR_TABLES}, check=vessel_of,
                     changed=lambda: watched.show(vessel),
                 ).draw()  # fmt: skip
-                spelled(f"expdesign run {scenario}", f"reads {vessel}")
+                spelled(f"expdesign run {shlex.quote(scenario)}", f"reads {vessel}")
 
 
 def _card(site: Site, scenario: str, asked: str) -> None:

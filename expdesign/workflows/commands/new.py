@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
+from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -27,7 +28,7 @@ from expdesign.plan.control import capability
 from expdesign.plan.values import PlanSettings
 from expdesign.progress import Progress, silent, within
 from expdesign.requests import repeating
-from expdesign.scenario import load_card, load_scenario, load_vessel
+from expdesign.scenario import NAME, NAME_RULE, load_card, load_scenario, load_vessel
 from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.simulation.helm import HARD_OVER_RAD, Helm
 from expdesign.vessel import Vessel
@@ -67,11 +68,11 @@ README = """\
 
 {ship}. From this folder's parent:
 
-1. `expdesign run {name}/scenario.toml --draft` takes a quick look; without `--draft` the plan is verified.
+1. `expdesign run {scenario} --draft` takes a quick look; without `--draft` the plan is verified.
 2. `vessel.toml` is the ship: particulars, actuators with limits and rates, model, and how far parameters may be off.
 3. `dictionary.toml` lists candidate manoeuvres, `area.toml` and `area.geojson` the water.
 4. `scenario.toml` names the three and states time, start, goal, weather and what the plan must keep to.
-5. After the runs: `expdesign estimate RECORD.csv --vessel {name}/vessel.toml`, then `expdesign replan`.
+5. After the runs: `expdesign estimate RECORD.csv --vessel {vessel}`, then `expdesign replan`.
 
 `expdesign explain` lists what may stand in a file; `expdesign explain first-plan` goes through a plan step by step.
 """
@@ -97,6 +98,8 @@ def new(request: requests.New, *, progress: Progress = silent) -> Outcome:
     if request.folder.exists():
         raise InputError(f"{request.folder} exists, expected the name of a folder to be made")
     name, kind = request.folder.resolve().name, request.kind or USUAL
+    if not NAME.fullmatch(name):
+        raise InputError(f"the folder's name is the scenario's and is {name!r}, expected {NAME_RULE}")
     if request.card is None:
         start = of_kind(name, kind)
     else:
@@ -107,7 +110,11 @@ def new(request: requests.New, *, progress: Progress = silent) -> Outcome:
     paths = write_files(request.folder, start.texts)
     load_scenario(request.folder / "scenario.toml")
     progress("done", 1.0)
-    facts = {"kind": kind, "ship": start.ship, "then": f"expdesign run {request.folder / 'scenario.toml'}"}
+    facts = {
+        "kind": kind,
+        "ship": start.ship,
+        "then": f"expdesign run {quote(str(request.folder / 'scenario.toml'))}",
+    }
     return Outcome(files=paths, document=Document(facts=facts, notes=start.notes))
 
 
@@ -128,7 +135,9 @@ def _files(name: str, texts: Mapping[str, str], *, length_m: float, ship: str) -
         "dictionary.toml": texts["dictionary"],
         "area.toml": AREA.format(name=f"bay of {length_m * 110 / 1000:.2g} km"),
         "area.geojson": _bay(length_m / OUTLINE_HULL_M),
-        "README.md": README.format(name=name, ship=ship),
+        "README.md": README.format(
+            name=name, ship=ship, scenario=quote(f"{name}/scenario.toml"), vessel=quote(f"{name}/vessel.toml")
+        ),
     }
 
 
