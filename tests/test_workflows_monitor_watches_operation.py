@@ -67,6 +67,7 @@ def test_a_change_of_the_ship_is_told_and_nothing_else(voyages: dict[str, Path],
 def watched(voyages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a watch over the voyage of the same ship."""
     folder = tmp_path_factory.mktemp("watched")
+    (folder / "since-change.csv").write_text("of an earlier watch\n")  # no alarm stands for it
     monitored(folder, voyages["same"], "--reference", voyages["reference"])
     return folder
 

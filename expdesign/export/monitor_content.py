@@ -61,7 +61,7 @@ class MonitorContent:
     state: State  # at the end
     limit: float  # threshold of the statistic
     false_alarm_days: float  # average time between false alarms that it is for [d]
-    alarms: tuple[Alarm, ...]  # as raised, in order; each again when settled
+    alarms: tuple[Alarm, ...]  # as raised, in order; each again when settled or withdrawn
     moments: tuple[Moment, ...]  # of the watch
     left_out_rows: int  # of the data, which lacked a number; unread_rows: in pieces that could not be read
     unread_rows: int
@@ -71,11 +71,17 @@ class MonitorContent:
 
     @property
     def found(self) -> tuple[Alarm, ...]:
-        """One for each change that was noticed, as it is known at the end."""
+        """One for each change that was noticed, as it is known at the end; without those withdrawn."""
         latest = {alarm.time_s: alarm for alarm in self.alarms}
         if self.state.alarm is not None:
             latest[self.state.alarm.time_s] = self.state.alarm
-        return tuple(latest.values())
+        return tuple(alarm for alarm in latest.values() if not alarm.withdrawn)
+
+    @property
+    def withdrawn(self) -> tuple[tuple[Alarm, Alarm], ...]:
+        """Alarms that were withdrawn, each as it was raised and at its end."""
+        raised = {alarm.time_s: alarm for alarm in reversed(self.alarms)}
+        return tuple((raised[alarm.time_s], alarm) for alarm in self.alarms if alarm.withdrawn)
 
     @property
     def calls(self) -> tuple[Call, ...]:
@@ -108,6 +114,8 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
         yield _no_alarm(content, rate)
     for alarm in found:
         yield _alarm(content, alarm)
+    for raised, last in content.withdrawn:
+        yield _withdrawn(content, raised, last)
     if found:
         yield f"Alarms are raised {rate}. For the cause, give the rows since then to expdesign diagnose."
     yield from _passed(content)
@@ -132,8 +140,10 @@ def _no_alarm(content: MonitorContent, rate: str) -> str:
     state, watched = content.state, np.flatnonzero(content.calibration.watched).tolist()
     largest = max((moment.statistic for moment in content.moments), default=0.0)
     statistic, limit = told_apart(largest, content.limit)
-    no_alarm = f"No alarm in {hours(state.judged_s)}{' in surge, sway and yaw' * (content.roll is not None)}"
-    numbers = f"The largest statistic is {statistic}, the threshold {limit}."
+    stands = " that stands" * bool(content.withdrawn)
+    no_alarm = f"No alarm{stands} in {hours(state.judged_s)}{' in surge, sway and yaw' * (content.roll is not None)}"
+    # with an alarm that was withdrawn, the statistic of which is told there
+    numbers = f"The largest statistic is {statistic}, the threshold {limit}." if not stands else ""
     if state.undecided_s:
         return (
             f"{no_alarm}, but the data end before it is known: a sum has been above the threshold of {limit} for "
@@ -143,11 +153,22 @@ def _no_alarm(content: MonitorContent, rate: str) -> str:
     if state.judged_s < soonest_s:
         return (
             f"{no_alarm}, which is too short to notice a change of a size that is watched for: the first would take "
-            f"{hours(soonest_s)}. {numbers}"
+            f"{hours(soonest_s)}. {numbers}".rstrip()
         )
     otherwise = any(carries_another(call).any() for call in content.calls) or (content.roll and content.roll.events)
     same = "" if otherwise else ": the ship is the one of the reference"
-    return f"{no_alarm}{same}, {rate}. {numbers}"
+    return f"{no_alarm}{same}, {rate}. {numbers}".rstrip()
+
+
+def _withdrawn(content: MonitorContent, raised: Alarm, last: Alarm) -> str:
+    """An alarm of something that passed."""
+    statistic, limit = told_apart(raised.statistic, content.limit)
+    return (
+        f"An alarm at {when(raised.time_s)}, of {content.changes[raised.change].words} by "
+        f"{size_in_words(content, raised)} since {when(raised.since_s)}, with the statistic {statistic} above the "
+        f"threshold {limit}, was withdrawn at {when(last.judged_s)}: the data since then do not "
+        "bear it out. What was seen has passed, as weather does."
+    )
 
 
 def _passed(content: MonitorContent) -> Iterator[str]:
@@ -294,8 +315,9 @@ def delay_s(content: MonitorContent, number: int) -> float:
 def monitor_header(content: MonitorContent) -> tuple[str, ...]:
     """Header of `monitor_rows`."""
     since_s = float(content.state.whole.since_s[0])
-    anew = any(alarm.since_s < since_s for alarm in content.found)
-    since = f"since {when(since_s)}, beside what was found" if anew else "since the watch began"
+    anew = any(alarm.since_s < since_s for alarm in content.alarms)
+    beside = ", beside what was found" * bool(content.found)
+    since = f"since {when(since_s)}{beside}" if anew else "since the watch began"
     return ("Change", "Size watched for", "Alarm after", since[:1].upper() + since[1:], "Not distinguishable from")
 
 
@@ -341,6 +363,9 @@ def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> st
                 "noise_std": [finite(value) for value in c.std.tolist()],
             },
             "alarms": [_alarm_entry(content, alarm) for alarm in content.found],
+            "withdrawn": [
+                {**_alarm_entry(content, raised), "withdrawn_s": last.judged_s} for raised, last in content.withdrawn
+            ],
             "port_calls": [_call_entry(content, call) for call in content.calls],
             "changes": [
                 {

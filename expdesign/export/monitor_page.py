@@ -136,6 +136,9 @@ def statistic_figure(content: MonitorContent) -> str:
     axes.axhline(content.limit, color=GREY, linestyle="--", linewidth=0.9, label="threshold")
     for number, alarm in enumerate(content.found):
         axes.axvline((alarm.time_s - begin_s) / HOUR, color=VERMILION, linewidth=1.2, label=None if number else "alarm")
+    for number, (alarm, _) in enumerate(content.withdrawn):
+        name = None if number else "alarm, withdrawn"
+        axes.axvline((alarm.time_s - begin_s) / HOUR, color=GREY, linestyle=":", linewidth=1.2, label=name)
     if max(statistics, default=0.0) > MOST_LINEAR * content.limit:
         axes.set_yscale("symlog", linthresh=content.limit)  # linear up to the threshold
         axes.yaxis.set_major_formatter("{x:g}")

@@ -34,6 +34,10 @@ CLOSE = 0.3  # standard errors of a step from which a size is not simulated agai
 UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
 # fewest stretches from which the size of a change is told, and share of those since then after which it is told anew
 SETTLING_STRETCHES, MORE = 20, 1 / 3
+# where a change that is not yet settled was none: standard errors of its size, of which an alarm asks for more
+# (`cusum.SIZED`) and a change of the ship gets ever more
+VANISHED = 1.5
+LASTING = 0.6  # share of its largest size that a change has as long as it lasts, where it is asked whether it is over
 REFINED = 0.2  # change of the size, in sizes that matter, below which it is refined no further
 # information, in inverse squared sizes, from which a change is settled; patience: factor of it where other changes
 # explain the data as well
@@ -60,7 +64,7 @@ def raised(
     """Raise an alarm of the sum with a number: the state and the alarm."""
     pending = state.sums.one(place)
     alarm = Alarm(time_s=state.until_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change)
-    state = replace(state, alarm=alarm, pending=pending, before=state.shift)
+    state = replace(state, alarm=alarm, pending=pending, before=state.shift, over=0.0)
     alarm = _attributed(state, alarm, pending, calibration)
     state = _simulated(replace(state, alarm=alarm), calibration, again, rules)
     assert state.alarm is not None
@@ -71,13 +75,18 @@ def settling(state: State, one: Judged, calibration: Calibration, again: Again |
     """The state with a stretch added to the estimate of the change that raised the alarm.
 
     Once it is known well, the ship is changed by it. That is repeated with the data that follow, as the error is not
-    linear in large changes, until there is nothing left to change; then it is settled.
+    linear in large changes, until there is nothing left to change; then it is settled. Where its size vanishes instead,
+    or the ship is as before again as surely as she had changed, the alarm is withdrawn, and the watch goes on from the
+    ship before it.
     """
     assert state.pending is not None
     assert state.alarm is not None
-    pending = state.pending.added(one)[0]
+    pending, score, information = state.pending.added(one)
+    over = _passed(state, score[0], information[0], calibration)
     alarm = _attributed(state, state.alarm, pending, calibration)
-    state = replace(state, pending=pending, alarm=alarm)
+    state = replace(state, pending=pending, alarm=alarm, over=over)
+    if abs(alarm.value) < VANISHED * alarm.std or over > rules.limit:
+        return _withdrawn(state)
     since = (state.until_s - alarm.since_s) / calibration.stretch_s
     if pending.count < max(SETTLING_STRETCHES, MORE * since):
         return state
@@ -94,20 +103,40 @@ def settling(state: State, one: Judged, calibration: Calibration, again: Again |
     score, information = beside_baseline(pending, calibration)
     found = np.zeros(len(state.shift))
     found[alarm.change] = score[alarm.change] / information[alarm.change, alarm.change]
-    known = replace(state.known, mean=state.known.mean - pending.taken[0] @ found)
-    every = np.ones(2 * len(found), dtype=bool)
-    state = state.with_known(known)
+    settled = bool(max(abs(found[alarm.change]), abs(alarm.value - before)) < REFINED)
+    state = _moved(state, pending, found)
+    return replace(state, alarm=replace(alarm, named=True, settled=settled), pending=pending.less(found))
+
+
+def _passed(state: State, score: Array, information: Array, calibration: Calibration) -> float:
+    """`State.over` with the score (m,) and information (m, m) of one more stretch."""
+    assert state.alarm is not None
+    change = state.alarm.change
+    simulated = float((state.shift - state.before)[change])
+    lasting, own, known = LASTING * state.alarm.largest - simulated, score[change], information[change, change]
+    ratio = -(simulated + lasting) * own - (simulated**2 - lasting**2) / 2.0 * known
+    return max(0.0, state.over + float(ratio / calibration.inflation[change]))
+
+
+def _moved(state: State, pending: Sums, change: Array) -> State:
+    """The state with the ship changed by (m,), and all sums begun anew."""
+    state = state.with_known(replace(state.known, mean=state.known.mean - pending.taken[0] @ change))
+    every = np.ones(len(state.ratios), dtype=bool)
     return replace(
         state,
         ratios=np.zeros(len(every)),
         sums=state.sums.again(every, state),
         whole=state.whole.again(every[:1], state),
-        shift=state.shift + found,
-        alarm=replace(
-            alarm, named=True, settled=bool(max(abs(found[alarm.change]), abs(alarm.value - before)) < REFINED)
-        ),
-        pending=pending.less(found),
+        shift=state.shift + change,
     )
+
+
+def _withdrawn(state: State) -> State:
+    """The state with the ship as before the alarm, which is withdrawn."""
+    assert state.pending is not None
+    assert state.alarm is not None
+    alarm = replace(state.alarm, withdrawn=True)
+    return replace(_moved(state, state.pending, state.before - state.shift), alarm=alarm)
 
 
 def _simulated(state: State, calibration: Calibration, again: Again | None, rules: Rules) -> State:
@@ -147,7 +176,8 @@ def _simulated(state: State, calibration: Calibration, again: Again | None, rule
         pending=replace(told[best].sums, stretches=np.zeros(1)),
     )
     assert state.pending is not None
-    alarm = _attributed(state, replace(alarm, change=best), told[best].sums, calibration, named=best)
+    alarm = alarm if best == alarm.change else replace(alarm, change=best, largest=0.0)
+    alarm = _attributed(state, alarm, told[best].sums, calibration, named=best)
     if alarm.named:
         return replace(state, alarm=alarm)
     others = tuple(cause for cause in rest if likely[cause] > likely[best] - AS_LIKELY)
@@ -273,10 +303,12 @@ def _attributed(
     inner = information[np.ix_(watched, watched)] + np.eye(len(watched))
     together = float(score[watched] @ np.linalg.solve(inner, score[watched])) / 2.0
     known = max(float(information[change, change]), 1e-300)
+    value = float(score[change] / known + so_far[change])
     return replace(
         alarm,
         change=change,
-        value=float(score[change] / known + so_far[change]),
+        value=value,
+        largest=max(value, alarm.largest if change == alarm.change else 0.0, key=abs),
         std=1.0 / math.sqrt(known),
         as_likely=rest if named is None else alarm.as_likely,
         unexplained=max(0.0, together - float(score[change] ** 2 / known / 2.0)),

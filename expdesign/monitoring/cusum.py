@@ -126,8 +126,9 @@ def watch(
         again: the stretches so far, those of `grams` among them; None where they are not kept.
 
     Returns:
-        The state after them, alarms as they were raised and again when settled, the sums after every stretch, and the
-        number of stretches used: not all where `shift` changed, so that the rest has to be linearised anew.
+        The state after them, alarms as they were raised and again when settled or withdrawn, the sums after every
+        stretch, and the number of stretches used: not all where `shift` changed, so that the rest has to be linearised
+        anew.
     """
     alarms: list[Alarm] = []
     steps: list[Step] = []
@@ -154,7 +155,7 @@ def watch(
         state = _counted(state, one, weather, calibration, duration_s, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
             state = settling(state, one, calibration, again, rules)
-            if state.alarm is not None and state.alarm.settled:
+            if state.alarm is not None and (state.alarm.settled or state.alarm.withdrawn):
                 alarms.append(state.alarm)
                 state = replace(state, alarm=None, pending=None, weather=np.ones(len(weather)))
         else:

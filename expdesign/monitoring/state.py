@@ -24,6 +24,7 @@ class Alarm:
     # value, std: its estimate in sizes, and the standard error
     value: float = 0.0
     std: float = 0.0
+    largest: float = 0.0  # of its sizes so far, while this change was the best
     as_likely: tuple[int, ...] = ()  # numbers of other changes that explain them as well, best first
     # steady accelerations since then, of the modelled ones of surge, sway and yaw by number, that explain them as well
     # without a change of the ship, each with its log-likelihood over that of the change
@@ -31,6 +32,8 @@ class Alarm:
     unexplained: float = 0.0  # log-likelihood that all changes together gain beyond the best one
     named: bool = False  # the change was named, and its size is being refined
     settled: bool = False  # its size, too, is as sure as it is going to be, and the watch goes on from the changed ship
+    # the data that followed say that it is over or was none, before its size was settled
+    withdrawn: bool = False
     judged_s: float = 0.0  # end of the data that the estimate is from [s]
 
 
@@ -213,6 +216,7 @@ class State:
     calls: tuple[Call, ...] = ()
     alarm: Alarm | None = None  # the alarm that is not yet settled, or None; pending: sums since its change
     pending: Sums | None = None
+    over: float = 0.0  # log-likelihood ratio that its change is over against that it lasts, of the best beginning
     # judged_s, left_out_s: measured time of the stretches that were judged, and of those whose error or weather was
     # beyond the reference for every change [s]; beyond_of_s: (m,) the first, where it was so for one change [s]
     judged_s: float = 0.0

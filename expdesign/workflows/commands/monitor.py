@@ -107,7 +107,7 @@ def _watching(table: Mapping[str, Any]) -> Watching:
     )
 
 
-STATE = "monitor-state.json"
+STATE, SINCE_CHANGE = "monitor-state.json", "since-change.csv"
 MOST_ROWS = 20_000
 """Largest number of rows in a piece of a file."""
 WRITTEN_EVERY_S = 20.0
@@ -140,6 +140,7 @@ def monitor(request: requests.Monitor, *, progress: Progress = silent) -> Outcom
     if isinstance(now.phase, Ready):
         raise NotInformative("the data hold no stretch under way that can be simulated, so that nothing is judged")
     content = _content(now.phase, now, asked, command)
+    _without_stale(now.phase, folder)
     return finished(request, folder, _files(content, now, asked), monitor_document(content), progress)
 
 
@@ -164,19 +165,21 @@ def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: b
     for piece, read in ahead(prepared, (asked,), tasks):
         now = with_piece(now, piece, read, asked)
         done += len(piece.text)
-        alarms = sum(not one.settled for one in now.phase.alarms) if isinstance(now.phase, Watching) else 0
+        told = now.phase.alarms if isinstance(now.phase, Watching) else ()
+        alarms = len({one.time_s for one in told}) - sum(one.withdrawn for one in told)
         progress(
             f"watching {source.name}, {counted(alarms, 'alarm')}", min(done / size_bytes if size_bytes else 0.0, 0.99)
         )
-        if not piece.again and (alarms, time.monotonic()) >= due:
+        if not piece.again and (len(told), time.monotonic()) >= due:
             _save(now, source, work)
-            due = (alarms, time.monotonic() + WRITTEN_EVERY_S)
+            due = (len(told), time.monotonic() + WRITTEN_EVERY_S)
     return now
 
 
 def _save(now: Watch, source: Path, work: _Work) -> None:
     """Results so far; of a stream that is learnt from, the rows, as they cannot be read again."""
     if isinstance(now.phase, Watching):
+        _without_stale(now.phase, work.folder)
         write_files(work.folder, _files(_content(now.phase, now, work.asked, work.command), now, work.asked))
     elif isinstance(now.phase, Ready) or source == STREAM:
         write_files(work.folder, {STATE: _state(now, work.asked)})
@@ -242,8 +245,14 @@ def _files(content: MonitorContent, now: Watch, asked: Asked) -> dict[str, Conte
         STATE: _state(now, asked),
     }
     if now.phase.changed:
-        files["since-change.csv"] = "".join(now.phase.changed)
+        files[SINCE_CHANGE] = "".join(now.phase.changed)
     return files
+
+
+def _without_stale(phase: Watching, folder: Path) -> None:
+    """Remove the rows of a change that no alarm stands for: of one that was withdrawn, or of an earlier watch."""
+    if not phase.changed:
+        (folder / SINCE_CHANGE).unlink(missing_ok=True)
 
 
 def _kept(asked: Asked) -> dict[str, float]:

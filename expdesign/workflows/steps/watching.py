@@ -318,11 +318,13 @@ def _moment(on: Watching, grams: Grams, rules: Rules, again: Again) -> tuple[Wat
     statistic = max((step.statistic for step in steps if step.compared), default=0.0)
     moment = Moment(time_s=state.until_s, statistic=statistic, value=value, std=std)
     on = replace(on, state=state, alarms=(*on.alarms, *alarms), moments=(*on.moments, moment))
-    return on, [alarm for alarm in alarms if not alarm.settled], used
+    return on, [alarm for alarm in alarms if not (alarm.settled or alarm.withdrawn)], used
 
 
 def _changed(on: Watching, piece: Piece, raised: Sequence[Alarm], offset_s: float) -> tuple[str, ...]:
-    """Header and lines since the last alarm's change."""
+    """Header and lines since the last alarm's change; none where it was withdrawn."""
+    if on.alarms and on.alarms[-1].withdrawn:
+        return ()
     if raised:
         since = piece.time_s + offset_s >= raised[-1].since_s
         return (piece.header, *(line for line, late in zip(piece.lines, since, strict=True) if late))
