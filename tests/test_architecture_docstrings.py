@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "expdesign"
@@ -41,9 +42,14 @@ def attributes(node: ast.ClassDef) -> set[str]:
     return names
 
 
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
 def unknown(path: Path) -> Iterator[str]:
     """Names in the docstrings of a file that do not exist."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         match node:
             case ast.FunctionDef():
                 names, section = arguments(node), "Args"
@@ -56,17 +62,24 @@ def unknown(path: Path) -> Iterator[str]:
                 yield f"{path.relative_to(PACKAGE)}: {node.name}: {name}"
 
 
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
 def test_what_docstrings_name_exists() -> None:
-    assert [name for path in sorted(PACKAGE.rglob("*.py")) for name in unknown(path)] == []
+    assert [name for path in FILES for name in unknown(path)] == []
 
 
-def test_tuning_constants_that_texts_name_exist() -> None:
-    files = {path: path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
-    fields = set[str]()
-    for text in files.values():
-        for node in ast.walk(ast.parse(text)):
-            fields |= attributes(node) if isinstance(node, ast.ClassDef) and node.name == "Tuning" else set()
-    named = {
-        (path.name, name) for path, text in files.items() for name in re.findall(r"`(?:TUNING|Tuning)\.(\w+)`", text)
-    }
-    assert {item for item in named if item[1] not in fields} == set()
+def test_what_texts_name_of_a_class_exists() -> None:
+    """`Plan.legs`, in docstrings and comments, of every class of the package."""
+    known: dict[str, set[str]] = {}
+    for node in (node for path in FILES for node in nodes(path)):
+        if isinstance(node, ast.ClassDef):
+            known.setdefault(node.name, set()).update(attributes(node))
+    named = [
+        (path.name, *found)
+        for path in FILES
+        for found in re.findall(r"`([A-Z]\w+)\.(\w+)`", path.read_text(encoding="utf-8"))
+        if found[0] in known
+    ]
+    assert len(named) > 10
+    assert [item for item in named if item[2] not in known[item[1]]] == []
