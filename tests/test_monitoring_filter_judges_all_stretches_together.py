@@ -1,11 +1,13 @@
 """The filter of the unmeasured force judges stretch by stretch as all of them together would be judged."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from expdesign.monitoring.cusum import SURELY, _scattered
+from expdesign.monitoring import State, calibrate
+from expdesign.monitoring.cusum import SURELY, _rougher, _scattered
 from expdesign.monitoring.evidence import stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
 from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
@@ -68,6 +70,26 @@ def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does_of_an_unknow
     wider, ship = plain + 4.0 * (dense - plain), X @ X.T
     costs = [e @ np.linalg.solve(R, e) + np.linalg.slogdet(R)[1] for R in (dense + ship, wider + ship)]
     assert float(two - one) == pytest.approx(costs[1] - costs[0], abs=1e-2)
+
+
+def test_a_watch_counts_by_how_much_other_weathers_are_likelier_than_that_of_the_reference() -> None:
+    columns = drawn_columns(6, seed=2)
+    stretches = stretches_of(grams_from(columns), NOISE, np.zeros(0))
+    weathers = Force(variance=np.stack([FORCE.variance, 4.0 * FORCE.variance]), time_s=FORCE.time_s)
+    state = State.begun(calibrate(drawn_grams(200, seed=0)), time_s=0.0)
+    state = replace(state, known=Known.nothing(FORCE), rough=Known.nothing(weathers), rougher=np.zeros(2))
+    for index, products in enumerate(stretches.products):
+        if index:
+            known, rough = after_gap(state.known, FORCE, STRETCH_S), after_gap(state.rough, weathers, STRETCH_S)
+            state = replace(state, known=known, rough=rough)
+        state = _rougher(state, products, judged(products, CHANGES, state.known), np.zeros(0, dtype=np.int64))
+    e, dense = columns[:, :, -1].ravel(), dense_covariance(columns)
+    S = np.zeros((6, 20, 6, STARTS))
+    S[np.arange(6), :, np.arange(6)] = columns[:, :, CHANGES : CHANGES + STARTS]
+    plain = np.eye(120) + 1e6 * S.reshape(120, 18) @ S.reshape(120, 18).T
+    costs = [e @ np.linalg.solve(R, e) + np.linalg.slogdet(R)[1] for R in (dense, plain + 4.0 * (dense - plain))]
+    assert state.rougher == pytest.approx([0.0, (costs[0] - costs[1]) / 2.0], abs=1e-2)
+    assert abs(costs[0] - costs[1]) > 1.0
 
 
 def test_what_a_force_surprises_by_is_one_on_average_per_component() -> None:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy
 
-from expdesign.monitoring import Calibration, Rules, State, calibrate, threshold, watch
+from expdesign.monitoring import Calibration, Rules, State, calibrate, cusum, threshold, watch
 from expdesign.monitoring.calibration import ROUGHER
 from expdesign.monitoring.cusum import (
     ALIKE,
     SURELY,
     TUNED_TO,
     WEATHER_LIMIT,
+    WEATHER_STRETCHES,
     _counted,
     _less,
+    _noticed,
     _rougher_by,
     _scattered,
     _summed,
@@ -26,6 +29,7 @@ from expdesign.monitoring.cusum import (
     soonest,
 )
 from expdesign.monitoring.force import Judged
+from expdesign.monitoring.state import Step
 from monitoring_case import CHANGES, STRETCH_S, drawn_columns, drawn_grams, grams_from
 
 
@@ -189,3 +193,45 @@ def test_time_in_which_a_large_sum_is_too_short_to_judge_adds_up(calibration: Ca
         assert state.undecided_s in (0.0, before + STRETCH_S)
         longest = max(longest, state.undecided_s)
     assert longest >= 2 * STRETCH_S
+
+
+def test_the_weather_is_an_average_over_stretches_in_units_of_the_reference(calibration: Calibration) -> None:
+    """After one stretch it has moved by one part of thirty; half of that where the reference surprises twice."""
+    moves = []
+    for factor in (1.0, 2.0, 4.0):
+        other = replace(calibration, surprise=factor * calibration.surprise)
+        begun = State.begun(other, time_s=0.0)
+        state, *_ = watch(other, begun, drawn_grams(1, seed=8), rules=Rules(limit=np.inf))
+        moves.append(WEATHER_STRETCHES * (state.weather - begun.weather) + begun.weather)
+    assert (moves[0] > 0.0).all()
+    assert np.array(moves[1:]) == pytest.approx(np.array([moves[0] / 2.0, moves[0] / 4.0]))
+
+
+@pytest.mark.parametrize(
+    ("rougher", "stretches", "said"),
+    [
+        pytest.param(1.0, 20, "weather", id="weather that lasts is believed"),
+        pytest.param(1.0, 19, "undecided", id="weather that begins looks like a change"),
+        pytest.param(-1.0, 30, "undecided", id="weather changes more often than ships"),
+        pytest.param(-6.0, 6, "undecided", id="few stretches tell nothing"),
+        pytest.param(-6.0, 7, "alarm", id="a change that weather does not explain"),
+    ],
+)
+def test_a_sum_above_the_threshold_is_weather_an_alarm_or_waited_for(
+    calibration: Calibration, monkeypatch: pytest.MonkeyPatch, rougher: float, stretches: int, said: str
+) -> None:
+    state = State.begun(calibration, time_s=0.0)
+    state = replace(
+        state, until_s=5e3, ratios=20.0 * (np.arange(2 * CHANGES) == 2), peaks=20.0 * (np.arange(2 * CHANGES) == 2),
+        sums=replace(state.sums, stretches=np.full(2 * CHANGES, float(stretches))),
+    )  # fmt: skip
+    alarm = SimpleNamespace(pushes=(), value=10.0, std=1.0, since_s=4e3)
+    monkeypatch.setattr(cusum, "_rougher_by", lambda *_: rougher)
+    monkeypatch.setattr(cusum, "_scattered", lambda *_: 1.0)
+    monkeypatch.setattr(cusum, "raised", lambda state, *_: (state, alarm))
+    step, rules = Step(time_s=5e3, statistic=20.0, change=2), Rules(limit=10.0)
+    after, found, told = _noticed(state, step, calibration, rules, STRETCH_S, None)
+    assert (after.by_weather > 0, after.undecided_s, found is not None) == (
+        said == "weather", STRETCH_S * (said == "undecided"), said == "alarm",
+    )  # fmt: skip
+    assert (after.ratios[2], told.compared) == (20.0 * (said != "weather"), said == "alarm")
