@@ -11,6 +11,8 @@ import pytest
 
 from diagnosis_case import vessel_of
 from expdesign.diagnosis.accuracy import accuracy
+from expdesign.diagnosis.causes.candidate import Situation
+from expdesign.diagnosis.causes.sensors import _of_row
 from expdesign.diagnosis.data.sampled_batch import derived_outputs
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.motion.linearisation import sensor_outputs
@@ -20,7 +22,7 @@ from expdesign.records import load_records
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, measure, simulate
 from expdesign.vessel import Sensors
-from expdesign.vessel.quantities import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG, Fault, Quantity
 
 BIAS = 0.06
 SHIP = vessel_of("barge")
@@ -119,3 +121,22 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
         name, factor, offset, _ = public_name(key, found)
         assert offset + factor * effect == pytest.approx(written[key]), name
     assert public_name("heading_bias", found)[0] == ("heading_bias_rad" if pose_only else "velocity_angle_rad")
+
+
+@pytest.mark.parametrize(
+    ("neutral", "looked_for"), [pytest.param(1.0, False, id="gain"), pytest.param(0.0, True, id="offset")]
+)
+def test_beside_positions_the_diagnosis_leaves_the_gain_of_a_log_to_them_and_looks_for_its_offset(
+    tmp_path, neutral, looked_for
+):
+    """A new row is one field: an offset of the log is proposed although no comparison of instruments tells it."""
+    words = Fault(name="log_bias", title="", missing="", summary="", explained="{}", unseen="")
+    row = Quantity(
+        stage="sensors", sensor="velocity", signals=("u",), neutral=neutral, shown_by=LOG, effects=("log_bias",)
+    )
+    record, _ = trial(tmp_path, Sensors(), pose_only=False)
+    ship = extended_model(SHIP, record)
+    windows = cut_windows(ship.model, record)
+    found = _of_row(row, words).candidates(Situation(ship=ship, windows=windows))
+    assert windows.has_position
+    assert [dict(one.free) for one in found] == [{"log_bias": 0.0}] * looked_for

@@ -76,11 +76,12 @@ LEVER_ARM = Cause(
 def _of_row(row: Quantity, fault: Fault) -> Cause:
     """The cause of a gain or an offset.
 
-    None of a log where positions are measured: these tell it before any model (`kinematics`).
+    Not of a gain of the log where positions are measured: these tell it before any model (`kinematics`). Of an offset
+    they do not, as a current looks like one.
     """
 
     def candidates(situation: Situation) -> tuple[Candidate, ...]:
-        told = row.shown_by == LOG and situation.windows.has_position
+        told = row.is_gain and row.shown_by == LOG and situation.windows.has_position
         seen = row.is_shown(situation.windows.derived) and {*row.signals} <= {*situation.ship.model.outputs}
         return (Candidate(cause=fault.name, free=dict.fromkeys(row.effects, 0.0)),) if seen and not told else ()
 
