@@ -22,7 +22,7 @@ from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start
 from expdesign.estimation.solve import sandwich
 from expdesign.estimation.solve.sandwich import WHITE_TEST_LEVEL, changing_variance, widening
-from expdesign.estimation.solve.solution import Weighting, solve_iv
+from expdesign.estimation.solve.solution import Weighting, solve_iv, solve_ls
 from expdesign.simulation import Variation
 from expdesign.simulation.environment import vary
 
@@ -227,6 +227,32 @@ def test_what_takes_nothing_from_the_residuals_has_no_changing_variance() -> Non
     factors = changing_variance(W, W[:, 0, :1] * rng.standard_normal((500, 1)), np.zeros(500, dtype=np.int64), steps)
     assert factors[0] > 1.2
     assert factors[1] == 1.0
+
+
+def test_roots_of_covariances_undo_each_other_whatever_the_units() -> None:
+    rng = np.random.default_rng(49)
+    units = 10.0 ** rng.uniform(-6, 6, 5)
+    half = rng.normal(size=(5, 9)) * units[:, None]
+    P = half @ half.T
+    root, inverse = sandwich._root(P), sandwich._root(P, inverse=True)
+    scale = np.outer(units, units)
+    assert root @ root.T / scale == pytest.approx(P / scale)
+    assert inverse @ P @ inverse.T == pytest.approx(np.eye(5), abs=1e-9)
+
+
+def test_a_variance_by_long_run_sums_allows_for_residuals_that_sum_to_zero() -> None:
+    """A mean of white noise: its variance is 1 / N, of which the sums lose a tenth by eight lags of 60 samples."""
+    rng, samples, draws = np.random.default_rng(50), 60, 400
+
+    def stated(covariance: str) -> np.ndarray:
+        noise = rng.normal(size=(draws, samples))
+        means = [single_output(np.ones((samples, 1)), e, parameters=("mean",)) for e in noise]
+        weighting = Weighting(covariance=covariance, lags=8)
+        return np.array([samples * float(solve_ls(one, weighting).covariance[0, 0]) for one in means])
+
+    allowed, plain = stated("hac"), stated("kernel")
+    assert abs(allowed.mean() - 1.0) < 4.0 * allowed.std() / np.sqrt(draws)
+    assert plain.mean() < 0.95
 
 
 def test_of_noise_of_another_shape_the_larger_of_both_estimates_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
