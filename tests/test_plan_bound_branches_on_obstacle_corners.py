@@ -10,6 +10,7 @@ import shapely
 
 from expdesign.plan.bounds.branch_and_bound import (
     CELL_HEADINGS,
+    LEVELS,
     GoalTimes,
     Saving,
     _near_corners,
@@ -104,6 +105,24 @@ def test_cells_are_kept_where_a_corner_may_be_in_the_hull_of_the_track(seed):
     near = (along <= track.hull_m + track.drift_m + farther_m).all(axis=-1).any(axis=1)
     assert 0.01 < near.mean() < 0.5
     np.testing.assert_array_equal(_near_corners(track, cells, corners, farther_m), cells[near])
+
+
+def test_places_at_every_island_are_looked_at():
+    """A half circle round each of four rocks, with the rock on its chord."""
+    rng = np.random.default_rng(7)
+    rocks, headings = np.array([[-90, -90], [90, -90], [-90, 90], [90, 90.0]]), rng.uniform(0, 2 * np.pi, 4)
+    beside = np.array([-11.0, 0.0])  # of the chord, seen from the middle of the track
+    c, s = np.cos(headings), np.sin(headings)
+    places = rocks - np.stack([c * beside[0] - s * beside[1], s * beside[0] + c * beside[1]], axis=1)
+    cells = np.column_stack([places, headings])
+    water = shapely.box(-200, -200, 200, 200)
+    water = water.difference(shapely.union_all([shapely.box(e - 7, n - 7, e + 7, n + 7) for n, e in rocks]))
+    times = grown_times([track_of(half_turn(), ship(), np.zeros(2))], water, np.array([0.0, 0.0]), STILL, ship())
+    assert times is not None
+    saving = Saving(track=track_of(half_turn(), ship(), np.zeros(2)), times=times, water=water, cell_m=5.0)
+    np.testing.assert_array_equal(saving._possible(cells, LEVELS), cells)
+    away = cells + np.array([0.0, 0.0, np.pi])  # the chord leads away from the rock
+    assert len(saving._possible(away, LEVELS)) == 0
 
 
 @pytest.mark.parametrize("current", [(0.0, 0.0), (0.3, -0.4)])
