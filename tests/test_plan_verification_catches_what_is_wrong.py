@@ -15,6 +15,7 @@ from expdesign.plan.verify import (
     _end_problems,
     _entry_problems,
     _limit_excess,
+    _speed_problems,
     _standing_problems,
     hull_clearance,
     verify_plan,
@@ -273,3 +274,19 @@ def test_what_answers_late_is_told_with_its_first_command_and_what_stood():
     (told,) = _standing_problems(vessel, commands, np.array([1.0, 1.0]))  # type: ignore[arg-type]
     assert told == "n1 is commanded 3 at once, expected 1 for a sample, as it answers late"
     assert _standing_problems(vessel, commands, np.array([3.0, 1.0])) == []  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fast", [1, 2, 3])
+def test_every_sample_within_a_leg_is_held_against_the_speed_of_legs(fast: int):
+    """Its ends may be as fast as runs are."""
+    environment, legs = replace(CALM, current_to=CURRENT_TO), [Leg(kind="reposition", name="goal", first=0, last=4)]
+    ahead = np.array([1.0, 0.0, 0.0])
+
+    def problems(*speeds: float) -> list[str]:
+        return _speed_problems(environment, moved(*(flowing() + speed * ahead for speed in speeds)), legs, 1.2)
+
+    assert problems(1.5, 1.4, 1.2, 1.3, 1.5) == []
+    assert problems(1.0, 1.2, 1.2, 1.2, 1.0) == []
+    speeds = np.where(np.arange(5) == fast, 1.5, 1.0)
+    (found,) = problems(*speeds)
+    assert f"goes 1.5 m/s through the water at {fast} s, stated 1.2 m/s" in found
