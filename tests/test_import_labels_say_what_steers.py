@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from expdesign.importing import family, presumed, sides
+from expdesign.importing import cut, family, presumed, sides
 from expdesign.importing.mapping import Mapping, Use
-from expdesign.importing.sampling import Stretch
+from expdesign.importing.sampling import Sampled, Stretch
 from expdesign.indices.read import orders
 from expdesign.signals import Batch
 from expdesign.simulation.helm import Helm
@@ -46,6 +46,31 @@ def craft(trip: Voyage) -> dict[str, dict[str, np.ndarray]]:
         },
         "one azimuth": {"n1_rps": still + 5.0, "a1_rad": -trip.rudder_rad},
     }  # fmt: skip
+
+
+OUT_OF_USE = {
+    "both engines": lambda n: n,
+    "one stands still": lambda n: 0.0 * n,
+    "one is dragged round": lambda n: 0.3 + 0.0 * n,
+    "one is in another unit": lambda n: n / 60.0,
+    "one feathers more the faster the other": lambda n: 0.1 * n + 0.2,
+}
+
+
+@pytest.mark.parametrize("kind", OUT_OF_USE)
+def test_an_engine_that_is_out_of_use_all_the_time_steers_nothing(kind: str) -> None:
+    parts = (("steady", 100.0), ("zigzag", 200.0), ("steady", 100.0), ("circle", 200.0), ("steady", 100.0))
+    trip = voyage(parts=parts).every(10)
+    engine = np.where(trip.time_s - trip.time_s[0] < 350.0, 4.0, 3.0)  # another speed for the circle
+    columns = {
+        "n1_rps": engine, "n2_rps": OUT_OF_USE[kind](engine), "rudder1_rad": trip.rudder_rad, "u_mps": trip.u_mps,
+    }  # fmt: skip
+    step_s = float(np.diff(trip.time_s).mean())
+    found = Sampled(
+        stretches=(Stretch(time_s=trip.time_s, columns=columns),), sample_time_s=step_s, notes=(), held_s={},
+        channels={},
+    )  # fmt: skip
+    assert len(cut(found, length_m=50.0)) == 2
 
 
 LABELS = {

@@ -252,6 +252,15 @@ def test_helm_let_go_ends_a_trial_and_a_second_trial_is_refused() -> None:
     assert "expected one trial in a file" in measured_trial(SHIP, record(twice, 1.0)).reason
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_circles_to_both_sides_are_no_zigzag_of_many_turns(late: bool) -> None:
+    rows, _ = sailed(FULL, 2.0 * math.pi, seconds=900.0)
+    both = record(np.array(rows)[round(40 / STEP) if late else 0 :], 1.0)
+    found = measured_trial(SHIP, both)
+    assert isinstance(found, NotStandard)
+    assert "expected 90.0 deg or less in a zig-zag: are these turning circles?" in found.reason
+
+
 @pytest.mark.parametrize("angle", [TEN, TWENTY])
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_on_the_rudder_reading_makes_no_orders(angle: float, seed: int) -> None:

@@ -118,8 +118,8 @@ def _acts(stretch: Stretch, inputs: Mapping[str, Array], pause: int) -> np.ndarr
     drives = [values for name, values in inputs.items() if name.startswith(("n", "tau_x"))]
     if drives:
         drive = np.mean(drives, axis=0)
-        sides = np.max([np.abs(own - drive) for own in drives], axis=0)
         size = max(float(np.abs(drives).max()), 1e-9)
+        sides = np.max([_beside(own, drive, size) for own in drives], axis=0)
         two = max(1, pause // 5)
         later, sooner = np.r_[drive[two:], np.full(two, drive[-1])], np.r_[np.full(two, drive[0]), drive[:-two]]
         changed = np.abs(later - sooner) > DRIVE_SHARE * size
@@ -132,6 +132,13 @@ def _acts(stretch: Stretch, inputs: Mapping[str, Array], pause: int) -> np.ndarr
             last = np.maximum.accumulate(np.where(changed, np.arange(len(u)), -(10**9)))
             acts |= moving & (np.arange(len(u)) - last < LONGEST_SETTLING * pause)
     return acts
+
+
+def _beside(own: Array, drive: Array, size: float) -> Array:
+    """(k,) how far one side is from what it always is beside all: nothing where its engine is never in use."""
+    lone, all_ = own - own.mean(), drive - drive.mean()
+    apart = np.abs(lone - float(lone @ all_) / max(float(all_ @ all_), 1e-18) * all_)
+    return apart if float(np.quantile(apart, 0.95)) < DRIVE_SHARE * size else np.abs(own - drive)
 
 
 def _joined(parts: Sequence[Sequence[int]], pause: int) -> list[tuple[int, int]]:

@@ -47,6 +47,8 @@ class NotStandard:
 
 
 Found = Circle | ZigZag | Stop | NotStandard
+WIDEST_SWING_RAD = math.pi / 2
+"""Heading, from the approach course, to which a zig-zag goes at most."""
 
 
 def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float = 0.0) -> Found:
@@ -220,6 +222,8 @@ def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
     swings = [execute.heading_rad for execute in found.executes[1:]]
     if any(one * other >= 0 for one, other in pairwise(swings)) or found.heading_rad < math.radians(0.5):
         return NotStandard(name=run.name, reason="the heading does not swing to both sides of the approach course")
+    if reason := _too_far(found):
+        return NotStandard(name=run.name, reason=reason)
     return replace(found, remarks=remarks)
 
 
@@ -274,6 +278,8 @@ def _late(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
     middle = float(np.mean(headings[::2]) + np.mean(headings[1::2])) / 2
     side = 1 if headings[1] > headings[0] else -1
     found = read_zigzag(run, orders_s=times, course_rad=middle, side=side, helm_rad=_size(held), speed_mps=None)
+    if reason := _too_far(found):
+        return NotStandard(name=run.name, reason=reason)
     remark = (
         f"{begins}: approach course and speed and the numbers of the overshoots cannot be had; those from the second "
         "recorded reversal on are given, and headings are from the middle of the swings"
@@ -290,6 +296,15 @@ def _unlike(held: tuple[_Held, ...]) -> str:
     if sizes.max() > 1.3 * sizes.min():
         return f"the helm is ordered to different angles, {_degrees(sizes.min())} and {_degrees(sizes.max())}"
     return ""
+
+
+def _too_far(found: ZigZag) -> str:
+    """Why a ship turned too far for a zig-zag before the helm was reversed, or ""."""
+    furthest = max(abs(execute.heading_rad) for execute in found.executes)
+    if furthest <= WIDEST_SWING_RAD:
+        return ""
+    turned = f"the ship turned by {_degrees(furthest)} before the helm was reversed"
+    return f"{turned}, expected {_degrees(WIDEST_SWING_RAD)} or less in a zig-zag: are these turning circles?"
 
 
 def _size(held: tuple[_Held, ...]) -> float:
