@@ -108,8 +108,9 @@ def ahead_only(model: VesselModel) -> VesselModel:
 
 
 def sailed(model: published.Model, vessel: Vessel, run: Primitive, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """What the sensors read of the published model under the commands of a run, which it begins steadily."""
-    approach = steady_ahead(vessel, float(np.hypot(*run.entry_velocity[:2])))
+    """What the sensors read of the published model under the commands of a run, which it begins steadily or at rest."""
+    begins_mps, fastest_mps = float(np.hypot(*run.entry_velocity[:2])), float(run.trajectory.velocity[:, 0].max())
+    approach = steady_ahead(vessel, begins_mps or fastest_mps)
     values, sample_s = run.commands.values, vessel.sample_time_s
     holds = published.order_for(model, approach.speed_mps) / approach.drive  # the engine order that holds is her own
     engines, helms = orders(vessel, values)

@@ -32,6 +32,7 @@ MODELS: dict[str, Callable[[], published.Model]] = {
     "esso-osaka-model": published.esso_osaka,
     "otter": published.otter,
     "naval-vessel": published.naval_vessel,
+    "car-carrier": published.car_carrier,
 }
 MEASURED = ("kvlcc2-model", "albatross", "macginitie")
 HARD = math.radians(35.0)

@@ -413,3 +413,50 @@ def naval_vessel() -> Model:
         return np.array([total_x / (mass + 17400.0), dv, dr])
 
     return Model(length_m=length, speed_mps=speed, rates=rates, helm_rate_radps=math.radians(2.32))
+
+
+def car_carrier() -> Model:
+    """A wind-powered car carrier of 206.6 m under engine: SSPA report RI40199079-06-00-C (2020), captive tests and
+    computations, with resistance and machinery, as the simulator in github.com/cahe9710/MT-ASB has them.
+
+    The equations are those of Seaman, in which weight makes forces non-dimensional. Surge's added mass is a twentieth
+    of the displacement, as that of the file, 2.7 times it, cannot be meant. Heel, sails and fins are left out.
+    """
+    length, draught, rho, gravity, x_g, x_r = 206.6, 8.5, 1025.0, 9.81, -9.8, -99.4
+    mass, beam, block = 30843.0 * rho, 39.4, 0.4463
+    root = math.sqrt(length * gravity)
+    unit = -math.pi * (draught / length) ** 2 * rho / 2 * length**3  # of added masses by Clarke
+    m_y = -unit * (1 + 0.16 * block * beam / draught - 5.1 * (beam / length) ** 2)
+    y_r = -unit * length * (0.67 * beam / length - 0.0033 * (beam / draught) ** 2)
+    n_v = -unit * length * (1.1 * beam / length - 0.041 * beam / draught)
+    j_z = -unit * length**2 * (1 / 12 + 0.017 * block * beam / draught - 0.33 * beam / length)
+    left = np.array([[mass + m_y, mass * x_g + y_r], [mass * x_g + n_v, mass * (0.25 * length) ** 2 + j_z]])
+    strips = length * (np.arange(20) / 20 - 0.475)
+    knots = np.array([0, 8, 10, 12, 14, 16, 18, 20.0]) * KNOT
+    newtons = np.array([0, 140238, 220963, 324425, 449530, 607078, 807456, 1052533.0])
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        u, v, r = x
+        swift, angle = max(abs(u), 0.1), -delta  # the rudder's angle is positive to port there
+        thrust = 0.5 * min(1.0, swift / 5.0) * 8e6 * order**3 / swift
+        slip = angle - 0.5 * v / swift - 0.5 * (x_r - x_g) * r / swift
+        stalled = 1.0 - 0.8 * slip**2
+        flow = 2 * 0.4819 * u * abs(u) * mass / length
+        slipstream = 2 * 0.1267 * thrust * angle * (1 + 7.28 * swift / root)
+        rudder = (flow * slip + slipstream) * stalled
+        drag = 1.0069 * rho / 2 * draught * length / 20
+        side = v + strips * r
+        ahead = v + (strips + 0.1442 * length) * r
+        total_x = thrust - math.copysign(float(np.interp(abs(u), knots, newtons)), u)
+        total_x += mass * (0.3165 * v * v / length - 0.7561 * v * r + 0.1456 * length * r * r)
+        total_x += -0.4156 * angle * (flow * angle + slipstream) + mass * (v * r + x_g * r * r)
+        total_y = mass * (-0.4839 * u * v / length - 0.2473 * u * u * v / length / root)
+        total_y += mass * (0.3730 * u * r - 0.01559 * u * u * r / root) - mass * u * r
+        total_y += rudder - drag * float(np.sum(np.abs(side) * side))
+        total_n = mass * (-0.3513 * u * v + 0.7360 * u * u * v / root)
+        total_n += mass * length * (-0.1588 * u * r - 0.2288 * u * u * r / root) - mass * x_g * u * r
+        total_n += (x_r - x_g) * rudder - drag * float(np.sum(np.abs(ahead) * ahead * (strips + 0.1442 * length)))
+        dv, dr = np.linalg.solve(left, [total_y, total_n])
+        return np.array([total_x / (1.05 * mass), dv, dr])
+
+    return Model(length_m=length, speed_mps=15.0 * KNOT, rates=rates, helm_rate_radps=math.radians(4.8))
