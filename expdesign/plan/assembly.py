@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from expdesign.plan.chart import (
     reachable,
     resolved,
 )
-from expdesign.plan.control import Capability, capability
+from expdesign.plan.control import Capability, HelmShip, capability
 from expdesign.plan.feasibility import without_room, without_way_out
 from expdesign.plan.legs import LegWater, through_water
 from expdesign.plan.local_planner import (
@@ -36,12 +37,12 @@ from expdesign.plan.local_planner import (
 )
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs
-from expdesign.plan.values import PlanProblem, WorkBudget
+from expdesign.plan.values import PlanProblem, PlanSettings, WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
-from expdesign.simulation import Environment
+from expdesign.simulation import Environment, to_body
 from expdesign.values import Array
-from expdesign.vessel import Vessel
+from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.vessel import covering_discs
 
 TRANSITION_BEAM = 100  # partial plans kept in the searches that choose the transitions to optimise
@@ -295,6 +296,37 @@ def dispersions(problem: PlanProblem) -> list[Array]:
 def confidence_of_run(problem: PlanProblem) -> float:
     """Share of cases in which each run keeps to its room."""
     return 1.0 - (1.0 - problem.settings.confidence) / max(1, sum(problem.repeats.values()))
+
+
+def check_current(vessel: Vessel, settings: PlanSettings, environment: Environment, goal: Array) -> None:
+    """Raise NoPlan for a mean current that a vessel cannot stem, or in which a helm cannot stop her at a pose (3,).
+
+    Where she lies still over the ground, she goes through the water as fast as it runs: ahead or astern by her engines,
+    but sideways hardly faster than in her hardest turns.
+    """
+    if not environment.current_to.any():
+        return
+    try:
+        ship = capability(vessel, settings, current_mps=float(np.hypot(*environment.current_to)))
+    except NoPlan as error:
+        if error.what == "speed" and settings.transit_speed_mps is None:
+            raise
+        return  # the planner says why, and what would help
+    if not isinstance(ship, HelmShip) or ship.hovers:
+        return
+    across = abs(float(to_body(environment.current_to, goal[2], NUMPY)[1]))
+    if across > ship.sideways_mps:
+        north, east = environment.current_to
+        against_deg = math.degrees(math.atan2(-east, -north)) % 360.0
+        raise NoPlan(
+            f"the mean current sets with {across:.2g} m/s across the heading at the goal, and vessel {vessel.name!r}, "
+            f"which is steered by a helm, goes sideways through the water with {ship.sideways_mps:.2g} m/s at "
+            "most, on the way into her hardest turns: she cannot stop there",
+            what="current",
+            which="goal",
+            place=goal[:2],
+            remedy=f"a heading of {against_deg:.0f} degrees at the goal meets the current ahead",
+        )
 
 
 def check_start(problem: PlanProblem, ship: Capability) -> None:

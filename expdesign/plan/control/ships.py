@@ -201,6 +201,11 @@ class HelmShip(Capability):
         """Some hull lengths."""
         return HELM_RUN_UP_HULLS * vessel.length_m / max(speed_mps, 0.5 * self.transit_speed_mps)
 
+    @property
+    def sideways_mps(self) -> float:
+        """Largest sway, on the way into the hardest turn from transit speed; by the rule of thumb for yaw rates."""
+        return HELM_OVERSHOOT * max(abs(turn.sway_mps) for turn in self.turns)
+
     def braking_mps2(self, speed_mps: float) -> float:
         """Deceleration with the engines full astern."""
         return speed_mps**2 / (2 * self.stopping_m)

@@ -32,9 +32,10 @@ from expdesign.workflows.steps.scored import growth_document, ready
 def plan(request: requests.Plan, *, progress: Progress = silent) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = loaded(request.scenario, progress, vessel=request.vessel)
-    check_plannable(case)
-    with shared(request), drafted(request, case):
-        return _plan(request, case, progress)
+    with drafted(request, case):
+        check_plannable(case)
+        with shared(request):
+            return _plan(request, case, progress)
 
 
 def _plan(request: requests.Plan, case: Scenario, progress: Progress) -> Outcome:
@@ -85,9 +86,10 @@ def run(request: requests.Run, *, progress: Progress = silent) -> Outcome:
         out = request.out or Path("runs") / f"{case.name}-draft"
         check_no_trial(out)
         request = request.but(out=out)
-    check_plannable(case)
-    with shared(request), drafted(request, case):
-        return _run(request, case, progress)
+    with drafted(request, case):
+        check_plannable(case)
+        with shared(request):
+            return _run(request, case, progress)
 
 
 def _run(request: requests.Run, case: Scenario, progress: Progress) -> Outcome:

@@ -21,7 +21,7 @@ from expdesign.export.routes import Route, build_bridge_route, planned_track
 from expdesign.growing import Growth
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
-from expdesign.plan.assembly import check_start_speed
+from expdesign.plan.assembly import check_current, check_start_speed
 from expdesign.plan.control import capability, needs_helm
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.values import LatticeProof, Plan, PlanProblem, RiskEstimate
@@ -80,7 +80,12 @@ def plan_problem(
 
 
 def check_plannable(case: Scenario) -> None:
-    """Raise InputError for a vessel that plans cannot be made for, or that is to begin faster than it can ever be."""
+    """Refuse at once what no plan can be made for.
+
+    Raises:
+        InputError: the vessel is none that plans are made for, or is to begin faster than it can ever be.
+        NoPlan: the vessel cannot stem the current, or not stop in it at the goal.
+    """
     if case.vessel.model.roll is not None:
         raise InputError(
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which plans do not follow; expected a vessel "
@@ -88,6 +93,7 @@ def check_plannable(case: Scenario) -> None:
         )
     if case.vessel.model.inertia is not None:
         raise InputError(NOT_SUPPORTED.format(what="a plan"))
+    check_current(case.vessel, case.plan, case.environment, case.goal)
     if case.under_way is None:
         return
     try:
