@@ -1,8 +1,9 @@
 """Published ships: their trials predicted from particulars alone, and after one circle and one speed are known.
 Cards are in `ships/`, each with its sources. The ships are compared with what was measured where the card states it
 (the model of KVLCC2, free running; top speeds of two boats), and otherwise with simulations of the ship's published
-model, each written in `published_models.py`. The scatter of the factors was set with these ships, but for KCS and the
-naval vessel, which were added later.
+model, each written in `published_models.py`. The scatter of the factors was set with these ships, but for KCS, the
+naval vessel and the car carrier, which were added later. Of these the naval vessel's number of rudders and thrust are
+not published (two, and what holds the speed), nor the car carrier's rudder area (the least that DNV asks for).
 
     python tests/benchmarks/record.py particulars
 """
