@@ -18,6 +18,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.durations.concave import Collected, polytope_of
+from expdesign.durations.rounding import _Search
 from expdesign.errors import ExpdesignError, InputError, NoAnswer, UnknownName
 
 
@@ -167,3 +168,18 @@ def test_two_primitives_of_one_name_or_no_time_are_refused():
         replace(given, names=("primitive 1", *given.names[1:]))
     with pytest.raises(InputError, match="total_s is 0"):
         replace(given, total_s=0.0)
+
+
+@pytest.mark.parametrize("draw", range(4))
+def test_what_fits_beside_whole_runs_is_what_the_limits_allow_of_it(draw: int):
+    """Of every primitive one more run, beside random runs that are allowed."""
+    search, rng = _Search.of(problem(draw, mixed(draw)), np.full(12, 1.0 / 12.0)), np.random.default_rng(draw)
+    counts = {True: 0, False: 0}
+    for _ in range(60):
+        runs = search.trimmed(np.maximum(rng.integers(0, 4, 12), search.fewest), -1)
+        for left_out in (None, *np.flatnonzero(runs > search.fewest)):
+            fewer = runs - (np.arange(12) == left_out)
+            fits = [search.allowed(fewer + (np.arange(12) == q)) for q in range(12)]
+            assert search.fitting(fewer).tolist() == np.flatnonzero(fits).tolist()
+            counts[True], counts[False] = counts[True] + sum(fits), counts[False] + 12 - sum(fits)
+    assert min(counts.values()) > 150
