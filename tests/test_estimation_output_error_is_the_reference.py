@@ -15,8 +15,7 @@ from expdesign.estimation.methods import estimate
 from expdesign.estimation.output_error import minimise
 from expdesign.estimation.replay import Stretches, compiled
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
-from expdesign.estimation.values import fit_percent
-from expdesign.signals import Batch, Record
+from expdesign.signals import Batch, Record, fit_percent
 from expdesign.simulation import Environment, Variation, motion_rates, simulate
 from expdesign.vessel import VesselModel
 from measured_trials import MODEL_SHIP_TRUE, model_ship_commands, prompt

@@ -13,9 +13,8 @@ from expdesign.estimation.excitation import WorstCase, check_excitation, worst_c
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration, simulate_batch
-from expdesign.estimation.values import fit_percent
 from expdesign.export.files.estimates import limit_entries
-from expdesign.signals import Commands
+from expdesign.signals import Commands, fit_percent
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
 
 

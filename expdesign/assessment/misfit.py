@@ -13,8 +13,8 @@ from expdesign.errors import Diverged
 from expdesign.estimation.methods import as_read, method_named
 from expdesign.estimation.regression import Integers, build_layout, build_regression, drive_of, model_for, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled, instrument_wind, simulate_batch
-from expdesign.estimation.values import Estimate, fit_percent
-from expdesign.signals import Batch, Record
+from expdesign.estimation.values import Estimate
+from expdesign.signals import Batch, Record, fit_percent
 from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import VesselModel
 

@@ -13,8 +13,7 @@ from expdesign.diagnosis.data import Windows, channel_std, cut_windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.errors import NotInformative
-from expdesign.estimation.values import fit_percent
-from expdesign.signals import Record
+from expdesign.signals import Record, fit_percent
 from expdesign.values import Array
 
 # Numbers that steer measures of accuracy.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.document import Table
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import finite, named_finite, strict_json
 from expdesign.export.words import counted
 from expdesign.step_trials import CHANNELS, NO_BEND, StepSample, StepTrial, Surface
 from expdesign.step_trials.live import StepList
@@ -278,10 +278,7 @@ def step_model_json(content: StepTrialContent) -> str:
                 for one in trial.currents
             ],
             "comparisons": [{**vars(one), "state_difference": finite(one.state_difference)} for one in trial.found],
-            "fit_percent": {
-                part.name: dict(zip("Ur", part.fit_percent.tolist(), strict=True))
-                for part in (*content.own, *content.tests)
-            },
+            "fit_percent": {part.name: named_finite("Ur", part.fit_percent) for part in (*content.own, *content.tests)},
             "notes": list(content.notes),
             "command": content.command,
         }

@@ -9,7 +9,7 @@ experiments, in Sensing and Control for Autonomous Vehicles (2017); S. Cao and R
 """
 
 from expdesign.step_trials.holds import CHANNELS, Controls, Sailed, ahead_only, controls_of, levels_of, sailed
-from expdesign.step_trials.identify import StepTrial, fit_percent, identify_steps
+from expdesign.step_trials.identify import StepTrial, identify_steps
 from expdesign.step_trials.nominal import nominal_vessel, with_delays
 from expdesign.step_trials.samples import StepSample
 from expdesign.step_trials.surfaces import NO_BEND, Surface

@@ -206,13 +206,6 @@ class TwoDofModel:
         return np.array([max(moved[0], 0.0), moved[1]])
 
 
-def fit_percent(measured: Array, simulated: Array) -> Array:
-    """(2,) 100 (1 - |error| / |measured - mean|) of U and r, as `expdesign estimate` counts it."""
-    error = np.linalg.norm(measured - simulated, axis=0)
-    size = np.linalg.norm(measured - measured.mean(axis=0), axis=0)
-    return np.asarray(100.0 * (1.0 - error / np.maximum(size, 1e-12)))
-
-
 LEAST_SAMPLES = 3
 
 

@@ -15,13 +15,12 @@ from expdesign.export.step_trial_page import step_trial_document
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
 from expdesign.requests import repeating
-from expdesign.signals import Record
+from expdesign.signals import Record, fit_percent
 from expdesign.step_trials import (
     Sailed,
     StepTrial,
     ahead_only,
     controls_of,
-    fit_percent,
     nominal_vessel,
     sailed,
     with_delays,
