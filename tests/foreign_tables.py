@@ -126,6 +126,15 @@ CLOCKS: dict[str, Style] = {
     "a zone in the cells": Style(
         cells={"time": lambda t: f"{when(t).astimezone(EAST_2):%Y-%m-%d %H:%M:%S%z}"}
     ),
+    "a zone by its name": Style(
+        cells={"time": lambda t: f"{when(t).astimezone(EAST_2):%Y-%m-%d %H:%M:%S} CEST"}
+    ),
+    "a zone by its name above the cells": Style(
+        names={"time": "Uhrzeit (MESZ)"}, cells={"time": lambda t: f"{when(t).astimezone(EAST_2):%Y-%m-%d %H:%M:%S}"}
+    ),
+    "days of MATLAB": Style(
+        names={"time": "datenum"}, cells={"time": lambda t: f"{round(t, 3) / 86400.0 + 719529.0:.9f}"}
+    ),
     "a zone in the name": Style(
         names={"time": "Time (UTC+2)"}, cells={"time": lambda t: f"{when(t).astimezone(EAST_2):%Y-%m-%d %H:%M:%S}"}
     ),

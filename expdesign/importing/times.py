@@ -14,11 +14,14 @@ from expdesign.importing.languages import words
 from expdesign.importing.mapping import split_unit
 from expdesign.values import Array
 
+ZONES_H = {"Z": 0, "UTC": 0, "GMT": 0, "WET": 0, "WEST": 1, "CET": 1, "MEZ": 1, "CEST": 2, "MESZ": 2, "EET": 2,
+           "EEST": 3, "MSK": 3, "JST": 9, "KST": 9}  # fmt: skip
+"""Names of zones that mean one thing everywhere -> hours later than UTC."""
 STAMP = re.compile(
     r"\s*(?:(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}[/.]\d{1,2}[/.]\d{2}|\d{8}(?=T)"
     r"|\d{4}:\d{3}(?=:))(?:[T ,_:]+|$))?"
     r"(?:(?P<h>\d{1,2})[:.]?(?P<m>\d{2})(?:[:.]?(?P<s>\d{2}(?:[.,]\d*|:\d{3})?))?\s*(?P<half>[AaPp][Mm])?)?"
-    r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?\s*"
+    r"\s*(?P<zone>[+-]\d{2}(?::?\d{2})?|" + "|".join(ZONES_H) + r")?\s*"
 )
 MONTHS = {
     word: number
@@ -38,7 +41,7 @@ NAMED = (
 """Dates with the name of a month."""
 TIME_NAME = re.compile(
     r"\b(time|utc|timestamp|stamp|datetime|date|epoch|clock|t|secs?|seconds?|received at|doy|julian|mjd|tow|"
-    r"decimal (hours?|day))\b"
+    r"decimal (hours?|day)|datenum)\b"
 )
 ZONE_NAME = re.compile(r"\b(?:UTC|GMT)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
 """A zone in the name of a column, as `Time (UTC+2)`."""
@@ -119,6 +122,8 @@ def read_stamps(texts: Sequence[str], *, day_first: bool = True) -> Stamps:
             second[row] = 3600.0 * hour + 60.0 * int(found["m"]) + parts
             if found["zone"] and found["zone"][0] in "+-":
                 second[row] -= _zone_s(found["zone"][0], found["zone"][1:3], found["zone"][3:].lstrip(":"))
+            elif found["zone"]:
+                second[row] -= 3600.0 * ZONES_H[found["zone"]]
     return Stamps(day, second)
 
 
@@ -128,8 +133,9 @@ def _zone_s(sign: str, hours: str, minutes: str | None) -> float:
 
 def zone_of(name: str) -> float:
     """How much later than UTC the zone in a column's name is [s]; 0 where it says none."""
-    found = ZONE_NAME.search(name)
-    return _zone_s(found[1], found[2], found[3]) if found else 0.0
+    if found := ZONE_NAME.search(name):
+        return _zone_s(found[1], found[2], found[3])
+    return next((3600.0 * later for zone, later in ZONES_H.items() if re.search(rf"\b{zone}\b", name)), 0.0)
 
 
 def _with_number_of_month(text: str) -> str:
