@@ -34,10 +34,13 @@ CLOSE = 0.3  # standard errors of a step from which a size is not simulated agai
 UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
 # fewest stretches from which the size of a change is told, and share of those since then after which it is told anew
 SETTLING_STRETCHES, MORE = 20, 1 / 3
+# stretches of a sum from which a change of the ship is told from weather beyond the reference, and from which weather
+# is believed; in between, weather that begins and a change that lasts look alike
+TOLD_APART = (7, 20)
 # where a change that is not yet settled was none: standard errors of its size, of which an alarm asks for more
 # (`cusum.SIZED`) and a change of the ship gets ever more
 VANISHED = 1.5
-LASTING = 0.6  # share of its largest size that a change has as long as it lasts, where it is asked whether it is over
+MOST = 0.6  # share of its size that has to go again where a change is over, and was not found too large
 REFINED = 0.2  # change of the size, in sizes that matter, below which it is refined no further
 # information, in inverse squared sizes, from which a change is settled; patience: factor of it where other changes
 # explain the data as well
@@ -64,9 +67,9 @@ def raised(
     """Raise an alarm of the sum with a number: the state and the alarm."""
     pending = state.sums.one(place)
     alarm = Alarm(time_s=state.until_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change)
-    state = replace(state, alarm=alarm, pending=pending, before=state.shift, over=0.0)
+    state = replace(state, alarm=alarm, pending=pending, before=state.shift)
     alarm = _attributed(state, alarm, pending, calibration)
-    state = _simulated(replace(state, alarm=alarm), calibration, again, rules)
+    state = _begun_anew(_simulated(replace(state, alarm=alarm), calibration, again, rules))
     assert state.alarm is not None
     return state, state.alarm
 
@@ -81,17 +84,21 @@ def settling(state: State, one: Judged, calibration: Calibration, again: Again |
     """
     assert state.pending is not None
     assert state.alarm is not None
-    pending, score, information = state.pending.added(one)
-    over = _passed(state, score[0], information[0], calibration)
+    pending = state.pending.added(one)[0]
     alarm = _attributed(state, state.alarm, pending, calibration)
-    state = replace(state, pending=pending, alarm=alarm, over=over)
-    if abs(alarm.value) < VANISHED * alarm.std or over > rules.limit:
+    state = replace(state, pending=pending, alarm=alarm)
+    if abs(alarm.value) < VANISHED * alarm.std:
         return _withdrawn(state)
+    if _over(state, alarm, calibration, rules):
+        # a wrong cause goes, too, where a turn contradicts it
+        other = _begun_anew(_simulated(state, calibration, again, rules))
+        return other if other.alarm is not None and other.alarm.change != alarm.change else _withdrawn(state)
     since = (state.until_s - alarm.since_s) / calibration.stretch_s
     if pending.count < max(SETTLING_STRETCHES, MORE * since):
         return state
     before = alarm.value
-    state = _simulated(state, calibration, again, rules)
+    ship, state = state.shift, _simulated(state, calibration, again, rules)
+    state = state if state.shift is ship else _begun_anew(state)
     assert state.pending is not None
     assert state.alarm is not None
     alarm, pending = state.alarm, state.pending
@@ -108,27 +115,28 @@ def settling(state: State, one: Judged, calibration: Calibration, again: Again |
     return replace(state, alarm=replace(alarm, named=True, settled=settled), pending=pending.less(found))
 
 
-def _passed(state: State, score: Array, information: Array, calibration: Calibration) -> float:
-    """`State.over` with the score (m,) and information (m, m) of one more stretch."""
-    assert state.alarm is not None
-    change = state.alarm.change
-    simulated = float((state.shift - state.before)[change])
-    lasting, own, known = LASTING * state.alarm.largest - simulated, score[change], information[change, change]
-    ratio = -(simulated + lasting) * own - (simulated**2 - lasting**2) / 2.0 * known
-    return max(0.0, state.over + float(ratio / calibration.inflation[change]))
+def _over(state: State, alarm: Alarm, calibration: Calibration, rules: Rules) -> bool:
+    """Whether most of an alarm's change has gone again, as surely as it came: by the sum of changes the other way."""
+    change, sums = alarm.change, state.sums
+    back = change + len(state.shift) * (alarm.value > 0.0)
+    score, known = float(sums.score[back, change]), max(float(sums.information[back, change, change]), 1e-300)
+    gain = score**2 / known / 2.0 / float(calibration.inflation[change])
+    size = max(abs(alarm.value), abs(float((state.shift - state.before)[change])))
+    lasting = state.ratios[back] > 0.0 and sums.stretches[back] >= TOLD_APART[0]
+    return bool(lasting) and gain > rules.limit and abs(score) / known > MOST * size
 
 
 def _moved(state: State, pending: Sums, change: Array) -> State:
     """The state with the ship changed by (m,), and all sums begun anew."""
     state = state.with_known(replace(state.known, mean=state.known.mean - pending.taken[0] @ change))
+    whole = state.whole.again(np.ones(1, dtype=bool), state)
+    return _begun_anew(replace(state, whole=whole, shift=state.shift + change))
+
+
+def _begun_anew(state: State) -> State:
+    """The state with the sums of all changes at zero."""
     every = np.ones(len(state.ratios), dtype=bool)
-    return replace(
-        state,
-        ratios=np.zeros(len(every)),
-        sums=state.sums.again(every, state),
-        whole=state.whole.again(every[:1], state),
-        shift=state.shift + change,
-    )
+    return replace(state, ratios=np.zeros(len(every)), sums=state.sums.again(every, state))
 
 
 def _withdrawn(state: State) -> State:
@@ -176,8 +184,7 @@ def _simulated(state: State, calibration: Calibration, again: Again | None, rule
         pending=replace(told[best].sums, stretches=np.zeros(1)),
     )
     assert state.pending is not None
-    alarm = alarm if best == alarm.change else replace(alarm, change=best, largest=0.0)
-    alarm = _attributed(state, alarm, told[best].sums, calibration, named=best)
+    alarm = _attributed(state, replace(alarm, change=best), told[best].sums, calibration, named=best)
     if alarm.named:
         return replace(state, alarm=alarm)
     others = tuple(cause for cause in rest if likely[cause] > likely[best] - AS_LIKELY)
@@ -303,12 +310,10 @@ def _attributed(
     inner = information[np.ix_(watched, watched)] + np.eye(len(watched))
     together = float(score[watched] @ np.linalg.solve(inner, score[watched])) / 2.0
     known = max(float(information[change, change]), 1e-300)
-    value = float(score[change] / known + so_far[change])
     return replace(
         alarm,
         change=change,
-        value=value,
-        largest=max(value, alarm.largest if change == alarm.change else 0.0, key=abs),
+        value=float(score[change] / known + so_far[change]),
         std=1.0 / math.sqrt(known),
         as_likely=rest if named is None else alarm.as_likely,
         unexplained=max(0.0, together - float(score[change] ** 2 / known / 2.0)),

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.monitoring.alarms import AS_LIKELY, REFINED, Again, beside_baseline, fits, raised, settling
+from expdesign.monitoring.alarms import AS_LIKELY, REFINED, TOLD_APART, Again, beside_baseline, fits, raised, settling
 from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration
 from expdesign.monitoring.evidence import Grams, stretches_of
 from expdesign.monitoring.force import Judged, after_gap, after_stretch, judged, surprise
@@ -29,9 +29,6 @@ TUNED_TO = 0.6
 
 WEATHER_STRETCHES = 30.0  # over which the surprise of the force is averaged
 WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond which the weather is unlike it
-# stretches of a sum from which a change of the ship is told from weather beyond the reference, and from which weather
-# is believed; in between, weather that begins and a change that lasts look alike
-TOLD_APART = (7, 20)
 WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
 FALLEN = 3.0  # by which a sum below its peak is of something that is over, as a squall is
 SIZED = 2.5  # standard errors of its size, those of the reference among them, that a change has to have
@@ -154,6 +151,7 @@ def watch(
         before, state = state, _rougher(state, own, one, loads)
         state = _counted(state, one, weather, calibration, duration_s, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
+            state, _ = _summed(state, one, before, begin_s, calibration)  # whether the change is over
             state = settling(state, one, calibration, again, rules)
             if state.alarm is not None and (state.alarm.settled or state.alarm.withdrawn):
                 alarms.append(state.alarm)

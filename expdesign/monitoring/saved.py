@@ -13,7 +13,7 @@ from expdesign.monitoring.force import Force, Known
 from expdesign.monitoring.noise import Noise
 from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
-COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "over", "shoal_s", "shoalest")
+COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "shoal_s", "shoalest")
 """Numbers of a state that are added up."""
 
 

@@ -24,7 +24,6 @@ class Alarm:
     # value, std: its estimate in sizes, and the standard error
     value: float = 0.0
     std: float = 0.0
-    largest: float = 0.0  # of its sizes so far, while this change was the best
     as_likely: tuple[int, ...] = ()  # numbers of other changes that explain them as well, best first
     # steady accelerations since then, of the modelled ones of surge, sway and yaw by number, that explain them as well
     # without a change of the ship, each with its log-likelihood over that of the change
@@ -216,7 +215,6 @@ class State:
     calls: tuple[Call, ...] = ()
     alarm: Alarm | None = None  # the alarm that is not yet settled, or None; pending: sums since its change
     pending: Sums | None = None
-    over: float = 0.0  # log-likelihood ratio that its change is over against that it lasts, of the best beginning
     # judged_s, left_out_s: measured time of the stretches that were judged, and of those whose error or weather was
     # beyond the reference for every change [s]; beyond_of_s: (m,) the first, where it was so for one change [s]
     judged_s: float = 0.0
