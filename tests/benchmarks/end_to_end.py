@@ -107,6 +107,16 @@ def ahead_only(model: VesselModel) -> VesselModel:
     )  # fmt: skip
 
 
+def of_second_side(vessel: Vessel) -> list[str]:
+    """Parameters of the second propeller and rudder of ships with two of each, which no run here orders apart.
+
+    They stay as the card has them, and those of the first side tell of both.
+    """
+    names = vessel.model.names
+    both = [name for name in names if "2" in name and name.replace("2", "1") in names]
+    return both if "rudder2" in vessel.model.inputs else []
+
+
 def sailed(model: published.Model, vessel: Vessel, run: Primitive, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """What the sensors read of the published model under the commands of a run, which it begins steadily or at rest."""
     begins_mps, fastest_mps = float(np.hypot(*run.entry_velocity[:2])), float(run.trajectory.velocity[:, 0].max())
@@ -204,12 +214,14 @@ def outcome(
         columns = sailed(model, files.vessel, run, rng)
         data.append(folder / f"{run.name}.csv")
         np.savetxt(data[-1], np.array(list(columns.values())).T, "%.9g", ",", header=",".join(columns), comments="")
+    second = [name for name in of_second_side(files.vessel) if not name.endswith("_astern")]
     common = [*map(str, data), "--vessel", str(folder / "vessel-ahead.toml"), "--quiet"]
     error, before, joined = math.nan, math.nan, ""
     inside = np.array([], dtype=bool)
     # the data alone, or what the card says beside them where these say too little
     for prior in ("none", "parameter_std"):
         asked = ["--prior", prior, "--method", *methods, "--out", str(folder / "estimate")]
+        asked += ["--fixed", *second] if second else []
         if expdesign(["estimate", *common, *asked]) != 0:
             continue
         before = float(np.median(np.abs(deviations(files.vessel, one.values)[0])))
