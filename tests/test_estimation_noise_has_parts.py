@@ -238,6 +238,10 @@ def test_roots_of_covariances_undo_each_other_whatever_the_units() -> None:
     scale = np.outer(units, units)
     assert root @ root.T / scale == pytest.approx(P / scale)
     assert inverse @ P @ inverse.T == pytest.approx(np.eye(5), abs=1e-9)
+    flat = half[:, :3] @ half[:, :3].T  # of which two combinations are known exactly
+    root, inverse = sandwich._root(flat), sandwich._root(flat, inverse=True)
+    assert root @ root.T / scale == pytest.approx(flat / scale)
+    assert np.linalg.eigvalsh(inverse @ flat @ inverse.T) == pytest.approx([0.0, 0.0, 1.0, 1.0, 1.0], abs=1e-6)
 
 
 def test_a_variance_by_long_run_sums_allows_for_residuals_that_sum_to_zero() -> None:

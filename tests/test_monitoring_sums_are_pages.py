@@ -96,6 +96,11 @@ def test_every_stretch_is_judged_or_left_out_and_time_beyond_the_reference_adds_
         state = _counted(state, one, weather, calibration, 60.0, int(grams.kind[0]), grams.budget[0])
         seen.append((state.judged_s, state.left_out_s, state.beyond_s, state.load.judged))
     assert seen == [(60, 0, 0, 1), (60, 60, 60, 2), (60, 120, 120, 3), (120, 120, 0, 4), (120, 180, 60, 5)]
+    for _ in range(2):  # beyond it for one change alone
+        weather = np.where(np.arange(CHANGES) == 1, 2.0 * WEATHER_LIMIT, 1.0)
+        state = _counted(state, one, weather, calibration, 60.0, int(grams.kind[0]), grams.budget[0])
+    assert state.beyond_of_s.tolist() == [0.0, 120.0, 0.0, 0.0]
+    assert (state.judged_s, state.left_out_s) == (240.0, 180.0)
 
 
 @pytest.mark.parametrize("alike", [(True, False), (False, True), (True, True)])
@@ -235,3 +240,21 @@ def test_a_sum_above_the_threshold_is_weather_an_alarm_or_waited_for(
         said == "weather", STRETCH_S * (said == "undecided"), said == "alarm",
     )  # fmt: skip
     assert (after.ratios[2], told.compared) == (20.0 * (said != "weather"), said == "alarm")
+
+
+def test_weather_that_explains_one_change_ends_the_sums_of_those_that_look_like_it(
+    calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the angle between their weights, whatever their unit."""
+    angles = np.array([0.0, math.acos(0.9 * ALIKE), math.acos(1.1 * ALIKE), math.pi / 2.0])
+    weights = np.zeros_like(calibration.weights)
+    weights[:, :2] = 5.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    calibration, state = replace(calibration, weights=weights), State.begun(calibration, time_s=0.0)
+    ratios = np.array([20.0, 5.0, 6.0, 7.0, 0.0, 3.0, 4.0, 0.0])
+    sums = replace(state.sums, stretches=np.full(2 * CHANGES, 30.0))
+    monkeypatch.setattr(cusum, "_rougher_by", lambda *_: 1.0)
+    monkeypatch.setattr(cusum, "_scattered", lambda *_: 1.0)
+    step, rules = Step(time_s=5e3, statistic=20.0, change=0), Rules(limit=10.0)
+    state = replace(state, ratios=ratios, peaks=ratios, sums=sums)
+    after, *_ = _noticed(state, step, calibration, rules, STRETCH_S, None)
+    assert after.ratios.tolist() == [0.0, 5.0, 0.0, 7.0, 0.0, 3.0, 0.0, 0.0]
