@@ -14,6 +14,7 @@ from expdesign.export.files import Known
 from expdesign.export.report.design import known_sentences
 from expdesign.export.whatif_content import Case, WhatIfContent, explanations
 from expdesign.export.words import MINUS, NB
+from expdesign.monitoring import Change
 from expdesign.sea_area import LocalFrame
 from expdesign.simulation import CALM
 
@@ -109,3 +110,16 @@ def test_what_the_rest_of_a_trial_adds_is_smaller_or_larger_as_the_numbers_are(
     assert ("times larger" in told) == (1 / ratio >= 1.02)
     factor = re.search(r"are ([\d.,e+]+) times", told)
     assert factor is None or float(factor[1]) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "words"),
+    [
+        (-0.00769, 0.019, "-0.8 ± 1.9 %"),
+        (0.0518, 0.16, "+5 ± 16 %"),
+        (1.2, 1.5, "+120 ± 150 %"),
+        (-1e-4, 0.03, "+0.0 ± 3.0 %"),
+    ],
+)
+def test_a_change_is_told_with_the_digits_of_its_error(value: float, std: float, words: str) -> None:
+    assert Change(effect="gain", size=0.1, unit=(0.01, "%"), words="thrust").in_words(value, std) == words

@@ -136,9 +136,9 @@ def statistic_figure(content: MonitorContent) -> str:
     axes.axhline(content.limit, color=GREY, linestyle="--", linewidth=0.9, label="threshold")
     for number, alarm in enumerate(content.found):
         axes.axvline((alarm.time_s - begin_s) / HOUR, color=VERMILION, linewidth=1.2, label=None if number else "alarm")
-    for number, (alarm, _) in enumerate(content.withdrawn):
-        name = None if number else "alarm, withdrawn"
-        axes.axvline((alarm.time_s - begin_s) / HOUR, color=GREY, linestyle=":", linewidth=1.2, label=name)
+    for number, (alarm, last) in enumerate(content.withdrawn):
+        ends, name = _hours([alarm.time_s, last.judged_s], begin_s).tolist(), None if number else "alarm, withdrawn"
+        axes.axvspan(*ends, color=GREY, alpha=0.2, linewidth=0.0, label=name)
     if max(statistics, default=0.0) > MOST_LINEAR * content.limit:
         axes.set_yscale("symlog", linthresh=content.limit)  # linear up to the threshold
         axes.yaxis.set_major_formatter("{x:g}")
@@ -216,7 +216,7 @@ def monitor_document(content: MonitorContent) -> Document:
                 Figure(
                     draw=partial(estimate_figure, content),
                     caption="Each change, had it alone happened when the watch began, with 95 % intervals. The "
-                    "estimates begin anew after a change has settled.",
+                    "estimates begin anew after a change has settled or an alarm was withdrawn.",
                 ),
             ),
             section(

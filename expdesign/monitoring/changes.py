@@ -33,10 +33,13 @@ class Change:
     load: float = 0.0  # standard deviation of what another load changes, in sizes; zero where it changes nothing
 
     def in_words(self, value: float, std: float | None = None) -> str:
-        """A value in words, e.g. "+12 +- 3 %"."""
+        """A value in words, e.g. "+12.1 ± 3.2 %", with no digits beyond those of its error."""
         divisor, name = self.unit
-        spread = "" if std is None else f" ± {abs(std / divisor):.2g}"
-        return f"{value / divisor + 0.0:+.3g}{spread} {name}"
+        size, spread = value / divisor + 0.0, 0.0 if std is None else abs(std / divisor)
+        if not 0.0 < spread < math.inf:
+            return f"{size:+.3g} {name}"
+        decimals = max(0, 1 - math.floor(math.log10(spread)))
+        return f"{round(size, decimals) + 0.0:+.{decimals}f} ± {spread:.{decimals}f} {name}"
 
 
 def watched_changes(ship: ExtendedModel, *, size: float = RELATIVE_SIZE) -> tuple[Change, ...]:
