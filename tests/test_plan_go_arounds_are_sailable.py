@@ -14,7 +14,7 @@ from expdesign.plan.control import Helmsman
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.monte_carlo import guidance as guiding
 from expdesign.plan.monte_carlo.guidance import GO_AROUND_ROOM, Approach, Guidance
-from expdesign.plan.monte_carlo.procedure import slowing, tolerances
+from expdesign.plan.monte_carlo.procedure import goal_within_m, slowing, tolerances
 from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers
 from expdesign.plan.runs import Fleet, Truths
 from expdesign.simulation import CALM
@@ -188,6 +188,53 @@ def test_thrusters_bring_a_ship_that_stops_beside_a_standing_start_to_it_on_the_
     assert found.begun.all()
     assert not found.go_arounds.any()
     assert np.abs(found.poses[..., 2]).max() < 1.0
+
+
+def to_the_goal(leg: np.ndarray, state: np.ndarray, count: int) -> tuple[Guidance, Fleet]:
+    """Nominal coasters at a state, on a leg to the goal."""
+    vessel, water = coaster(), open_water(coaster())
+    ship = water.ship
+    parameters = np.tile(vessel.model.parameters, (count, 1))
+    truths = Truths(parameters=parameters, current_to=np.zeros((count, 2)), wind_to=np.zeros((count, 2)))
+    guidance = Guidance(
+        Helmsman(vessel=vessel, environment=CALM, ship=ship),
+        water,
+        leg,
+        within=tolerances(water),
+        sailing=np.ones(count, bool),
+        inputs=np.zeros(len(vessel.limits)),
+        last=True,
+    )
+    standing = ship.approach.inputs
+    return guidance, Fleet(vessel, CALM, truths, state=state, standing=standing, rng=np.random.default_rng(5))
+
+
+def test_a_ship_that_passes_the_goal_while_she_slows_down_has_reached_it():
+    water, count = open_water(coaster()), 2
+    helm = Helmsman(vessel=coaster(), environment=CALM, ship=water.ship)
+    leg = np.vstack([slowing(helm, np.zeros(6), 200), np.zeros(6)])  # she cannot stop on it
+    state = leg[0] + np.array([0.0, 0.0, 0.0, water.ship.transit_speed_mps - leg[0, 3], 0.0, 0.0])
+    guidance, fleet = to_the_goal(leg, state, count)
+    found = guidance.sail(fleet, np.zeros((count, 3)))
+    off_m = np.hypot(*(found.poses[:, 0, :2] - leg[-1, :2]).T)
+    assert off_m[-1] > goal_within_m(water) > off_m.min()
+    assert found.begun.all()
+    assert not found.go_arounds.any()
+
+
+@pytest.mark.parametrize("hulls", [1.0, 2.0])
+def test_a_leg_that_leads_past_the_goal_reaches_it_at_its_end(hulls):
+    water, length = open_water(coaster()), coaster().length_m
+    away = np.linspace(0.0, 20.0 * length, 200)
+    leg = np.zeros((400, 6))
+    leg[:, 0] = np.r_[away, away[::-1]]
+    guidance, _ = to_the_goal(leg, leg[0], 1)
+    ships, beside = np.zeros(1, dtype=int), np.array([[0.0, hulls * length, 0.0, 1.0, 0.0, 0.0]])
+    guidance._reach(ships, beside)
+    assert not guidance._arrived.any()  # all of the leg is left
+    guidance._at[:] = len(leg) - 2
+    guidance._reach(ships, beside)
+    assert guidance._arrived.any() == (hulls * length <= goal_within_m(water))
 
 
 def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_the_same():

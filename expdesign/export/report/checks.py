@@ -36,6 +36,7 @@ def procedure_sentences(plan: Plan) -> list[str]:
         "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
         f"on the planned heading at the planned speed. After {words.counted(risk.go_arounds, 'go-around')}, abort the "
         f"trial; also where one start takes longer to reach than the whole planned trial, {words.duration(planned_s)}.",
+        f"Goal: it is reached within {words.distance(risk.legs[-1].position_m)} of it, at any heading and speed.",
     ]
 
 

@@ -11,7 +11,14 @@ import shapely
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
-from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, at_rest, planned_stretch, run_up
+from expdesign.plan.monte_carlo.procedure import (
+    ABORT_CAUSES,
+    Tolerances,
+    at_rest,
+    goal_within_m,
+    planned_stretch,
+    run_up,
+)
 from expdesign.plan.monte_carlo.return_paths import (
     GoAroundPaths,
     PathFollowers,
@@ -33,7 +40,7 @@ LEAST_STEP = 0.2  # movement of a slow reference per sample, in that at transit 
 PARALLEL_SHARE = 0.5  # of the tolerance of a run's start position, by which a ship may sail beside the leg before it
 REJOIN_SAMPLES = 5  # samples between the points at which a return to the leg is checked against the shore
 REJOIN_SHARE = 0.5  # of a leg's time within which a ship must be able to return to it
-ARRIVED_HULLS = 1.5  # distance from the goal at which a trial has reached it
+LAST_WAY = 2.0  # way that is left, in the distance from which the goal is reached, on which a ship may reach it
 # distance from the start within which helm-steered ships keep the heading, not the track: there they drift; longer
 # where starts are less exact, as far as so many tolerances of the position
 STEADY_HULLS, STEADY_ROOM = 2.0, 2.0
@@ -89,11 +96,13 @@ class Guidance:
         after_m = 0.0 if last else max(PAST_START_HULLS * helm.vessel.length_m, within.position_m)
         n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
-        self._arrived_m = water.start_tolerance * ARRIVED_HULLS * helm.vessel.length_m
+        self._arrived, self._arrived_m = np.zeros(n, dtype=bool), goal_within_m(water)
         self._free = np.array(helm.vessel.turns_freely, dtype=float)
         self._desired, self._moves, self._within = track[-1], not at_rest(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
+        steps_m = lengths(np.diff(self._reference.states[:, :2], axis=0))
+        self._way_m = np.r_[0.0, np.cumsum(steps_m)]
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
         self._followers = PathFollowers(helm, runs_up.states[0], n, reach_m=float(reach_m))
@@ -151,7 +160,7 @@ class Guidance:
         states, late = part.states, self._sample > self._deadline[ships]
         self.doing[ships[part.lost]] = ABORTED
         if self._last:
-            self.doing[ships[self._at_goal(states) & (self.doing[ships] == RETURNING)]] = BEGUN
+            self._reach(ships, states)
         on = self.doing[ships] == TRACKING
         passed = self._passed(ships, states, on)
         self._abort_cause[ships[late]] = ABORT_CAUSES.index("time")
@@ -194,8 +203,8 @@ class Guidance:
         """
         used, waited = shares.max(axis=1), self._sample > self._deadline[ships] - self._waiting / 2
         if self._last:
-            there = self._at_goal(states)
-            return there | waited | (not self._helm.ship.keeps_station), there
+            reached = self._arrived[ships]
+            return reached | waited | (not self._helm.ship.keeps_station), reached
         if self._stops:  # she begins while she may: at rest she cannot turn to the heading, nor come nearer
             stopped = at_rest(self._helm, states) & (self._ahead_m(ships, states) <= 0.0)
             return (used <= 1.0) | (stopped & (self._at[ships] >= self._end[ships])), used <= 1.0
@@ -204,10 +213,17 @@ class Guidance:
         gone_by = (self._at[ships] >= self._most[ships]) | (shares[:, 0] > 1.0)
         return (used <= 1.0) | gone_by, used <= 1.0
 
-    def _at_goal(self, states: Array) -> np.ndarray:
-        """(k,) whether ships at states (k, 6) of the leg to the goal have reached it: their place alone counts."""
-        off_m = lengths(states[:, :2] - self._desired[:2])
-        return np.asarray(off_m <= self._arrived_m)
+    def _reach(self, ships: np.ndarray, states: Array) -> None:
+        """Note which of ships (k,) at states (k, 6) have reached the goal: their place alone counts, at any time.
+
+        One that returns need not go on. One that follows the leg does, to its end: a ship without thrusters to the side
+        passes the goal while she slows down. Where the leg leads past the goal before, it does not count.
+        """
+        near = lengths(states[:, :2] - self._desired[:2]) <= self._arrived_m
+        left_m = self._way_m[self._end[ships].astype(int)] - self._way_m[self._at[ships].astype(int)]
+        back = self.doing[ships] == RETURNING
+        self._arrived[ships] |= near & (back | (left_m <= LAST_WAY * self._arrived_m))
+        self.doing[ships[near & back]] = BEGUN
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships], self._shift[ships] = TRACKING, 0.0

@@ -12,6 +12,7 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
 4. Otherwise it goes around, as it does where it cannot return to a leg: by the shortest path in safe water to the
    beginning of a run-up, then up to the start again, steady on the planned heading and speed; `GO_AROUNDS` times at
    most. Then the trial is aborted, as it is where this takes longer than the whole planned trial.
+5. The goal is reached by a ship that comes within `GOAL_HULLS` of it; heading and speed do not count there.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ HEADING_RAD = radians(3.0)  # tolerance of a run's start heading
 POSITION_HULLS = 0.2  # least tolerance of a run's start position, in hull lengths
 # share of the room beyond the clearance that the position may use instead, and its limit in hull lengths
 POSITION_ROOM, POSITION_MOST_HULLS = 0.5, 3.0
+GOAL_HULLS = 1.5  # distance from the goal at which a trial has reached it, in hull lengths
 SPEED_SHARE, YAW_RATE_SHARE = 0.1, 0.1  # tolerances of its velocity in transit speeds, of its yaw rate in the largest
 # share of the position's tolerance by which another speed at the start may move the run instead, and its limit in
 # transit speeds
@@ -94,6 +96,11 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
         speed_mps=float(np.clip(moved_mps, least * ship.transit_speed_mps, most * ship.transit_speed_mps)),
         yaw_rate_radps=wider * YAW_RATE_SHARE * ship.turn_rate_radps,
     )
+
+
+def goal_within_m(water: LegWater) -> float:
+    """Distance from the goal at which a trial has reached it, wider as the plan's settings ask [m]."""
+    return water.start_tolerance * GOAL_HULLS * water.vessel.length_m
 
 
 def speed_decay_s(vessel: Vessel, speed_mps: float) -> float:

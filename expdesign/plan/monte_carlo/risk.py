@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,7 @@ import shapely
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.guidance import GO_AROUNDS, Guidance, open_loop
-from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, tolerances
+from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, goal_within_m, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
 from expdesign.plan.values import Leg, LegOutcome, PlanSettings, RiskEstimate, SailedTrial
 from expdesign.plan.verify import hull_clearance
@@ -239,7 +239,7 @@ def _sail_part(
                 helm,
                 water,
                 track[leg.first : leg.last + 1],
-                within=within[min(index + 1, len(legs) - 1)],
+                within=tolerances(water) if index == len(legs) - 1 else within[index + 1],
                 sailing=sailing,
                 inputs=values[-1],
                 last=index == len(legs) - 1,
@@ -265,11 +265,15 @@ def _sail_part(
 
 
 def start_tolerances(water: LegWater, sailed: SailedTrial) -> tuple[Tolerances, ...]:
-    """Start tolerances of each leg; for runs by the room of the hull over all of the planned run."""
+    """Start tolerances of each leg; for runs by the room of the hull over all of the planned run.
+
+    What is stated of the last leg is within what distance the goal is reached.
+    """
     clearance = hull_clearance(water.area, sailed.trajectory, water.vessel.hull_b)
     spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in sailed.legs]
     runs = [leg.kind == "primitive" for leg in sailed.legs]
-    return tuple(tolerances(water, room if run else 0.0) for room, run in zip(spare, runs, strict=True))
+    within = [tolerances(water, room if run else 0.0) for room, run in zip(spare, runs, strict=True)]
+    return (*within[:-1], replace(within[-1], position_m=goal_within_m(water)))
 
 
 TRIALS, MOST_TRIALS = 500, 2000  # drawn of a plan at least and at most
