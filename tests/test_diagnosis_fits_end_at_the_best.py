@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from diagnosis_case import hidden_record, vessel_of
+from diagnosis_case import Told, drawn_parameters, hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit import gauss_newton
+from expdesign.diagnosis.fit import gauss_newton, with_longer_windows
 from expdesign.diagnosis.fit.fit import FitOptions, after_step
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.model.terms import term_factors
+from expdesign.diagnosis.motion import fitted_start, stable_windows
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -75,3 +76,30 @@ def test_a_share_of_a_step_is_taken_only_where_it_lowers_the_cost(monkeypatch):
     fit(extended, windows, (), starts=initial_states(windows))
     assert steps[-1][1] is None  # no share of the last one lowers it
     assert all(after <= before for before, after, tries in steps if after is not None and tries > 1)
+
+
+FAR = [
+    ("coaster", {"N_r": 0.6}, 3), ("coaster", {"N_r": 0.7, "Y_v": 0.8}, 3),
+    *(pytest.param(ship, {"N_r": 0.6}, seed, marks=pytest.mark.thorough)
+      for ship, seed in (("coaster", 1), ("coaster", 2), ("barge", 1), ("barge", 3), ("tug", 1))),
+]  # fmt: skip
+"""Ship, factors of parameters, seed."""
+
+
+@pytest.mark.parametrize(("ship", "factors", "seed"), FAR)
+def test_a_model_that_is_far_from_the_ship_is_fitted_as_well_as_one_that_begins_at_the_truth(
+    ship: str, factors: dict[str, float], seed: int
+) -> None:
+    """Before any cause is tested: else causes have to explain what is left. Deviances are twice a log likelihood."""
+    record = hidden_record(
+        ship, seed=seed, factors=factors, relative_std=0.1, batches=4, samples=300, manoeuvre="zigzag"
+    )
+    vessel = vessel_of(ship, relative_std=0.1)
+    begun = extended_model(vessel, record)
+    begun, windows = with_longer_windows(begun, record, stable_windows(begun, record))
+    found = fit_nuisance(begun, windows, fitted_start(begun, windows))
+    told = drawn_parameters(ship, Told(factors=factors, relative_std=0.1), np.random.default_rng(seed))
+    rows = zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True)
+    true = begun.with_effects({f"theta:{name}": told[name] - value for name, value in rows})
+    best = fit(true, windows, (), starts=fitted_start(true, windows), options=FitOptions(steps=12))
+    assert found.deviance < best.deviance + 2.0

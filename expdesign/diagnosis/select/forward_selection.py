@@ -22,6 +22,7 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
 )
 from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import fitted_start
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
@@ -35,6 +36,7 @@ from expdesign.diagnosis.select.selection_round import (
     selection_round,
 )
 from expdesign.diagnosis.select.shortlist import listed_causes
+from expdesign.diagnosis.select.starting_point import nearer_in_short_windows
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import Estimated
 from expdesign.values import Array
@@ -199,8 +201,17 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
         return found
     options = FitOptions(noise=found.noise, steps=NUISANCE_STEPS, warm_start=found)
     found = fit(found.ship, windows, (), starts=found.starts, options=options)
-    anew = FitOptions(steps=NUISANCE_STEPS, warm_start=found)
-    return min(found, fit(found.ship, windows, (), starts=found.starts, options=anew), key=lambda item: item.deviance)
+    begin = nearer_in_short_windows(ship, windows, found) or found.ship
+    anew, afresh = FitOptions(steps=NUISANCE_STEPS, warm_start=found), FitOptions(steps=NUISANCE_STEPS)
+    others = (
+        fit(found.ship, windows, (), starts=found.starts, options=anew),
+        fit(begin, windows, (), starts=fitted_start(begin, windows), options=afresh),
+    )
+    return min(found, *others, key=_deviance)
+
+
+def _deviance(item: Fit) -> float:
+    return item.deviance
 
 
 def _smaller_causes(block: Step, search: _Search) -> list[Step]:

@@ -27,6 +27,7 @@ SHORT_STEPS = 6  # Gauss-Newton steps in short windows
 # candidates that gain less than this share of the best in short windows are not fitted in long ones
 LEAST_GAIN_SHARE = 0.75
 REFINED_GRID = 11  # values of the second grid search
+FAR_BETTER = 0.5  # share of a squared error below which another one is far better
 
 
 FROM_NOTHING = FitOptions(steps=SHORT_STEPS)
@@ -114,6 +115,24 @@ def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
         return None
 
 
+def nearer_in_short_windows(ship: ExtendedModel, windows: Windows, found: Fit) -> ExtendedModel | None:
+    """The model with its uncertain effects fitted in short windows, where it simulates long ones far better than a fit.
+
+    A model that is far from the ship leaves so much over long windows that a fit to them may end with all of it in the
+    noise. None where windows are short anyway, where it cannot be fitted, or where the fit is about as near.
+    """
+    samples = max(FEWEST_SAMPLES, round(SHORT_S / windows.sample_s))
+    if 2 * samples > windows.measured.shape[1]:
+        return None
+    short = replace(windows.cut_shorter(samples), white_noise=True)
+    try:
+        near = fit(ship, short, (), starts=initial_states(short, ship.states), options=FROM_NOTHING).ship
+        left, before = (_squared_error(found, windows, one) for one in (near, found.ship))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    return near if left < FAR_BETTER * before else None
+
+
 def start_in_short_windows(
     short_fit: Fit,
     shortlist: Sequence[ScoreTest],
@@ -185,7 +204,7 @@ def start_nearer(base: Fit, windows: Windows, point: StartingPoint) -> tuple[Ext
     before, after = _squared_error(base, windows, base.ship), _squared_error(base, windows, guess)
     middle = windows.cut_shorter(max(FEWEST_SAMPLES, round(MIDDLE_S / windows.sample_s)))
     ship = guess
-    if after > 0.5 * before and middle.measured.shape[1] < windows.measured.shape[1]:
+    if after > FAR_BETTER * before and middle.measured.shape[1] < windows.measured.shape[1]:
         part, starts = replace(middle, white_noise=True), initial_states(middle, guess.states)
         ship = fit(guess, part, joint_keys(base, point.keys), starts=starts, options=FROM_NOTHING).ship
         after = _squared_error(base, windows, ship)
