@@ -209,6 +209,18 @@ def test_runs_that_lack_something_get_what_they_lack_within_the_limits(draw: int
     assert _completed(search, found, shortfall) is found
 
 
+@pytest.mark.parametrize("draw", range(12))
+def test_time_that_is_left_is_filled_by_the_run_that_gains_most_a_second(draw: int):
+    problem = small_problem(draw, equal=False)
+    search = _Search.of(problem, np.full(len(problem.run_s), 1.0 / len(problem.run_s)))
+    runs = np.zeros(len(problem.run_s), dtype=int)
+    units = np.eye(len(runs), dtype=int)
+    while allowed := [q for q in range(len(runs)) if search.allowed(runs + units[q])]:
+        gains = [(search.value_of(runs + units[q]) - search.value_of(runs)) / problem.run_s[q] for q in allowed]
+        runs = runs + units[allowed[int(np.argmax(gains))]]
+    assert search.filled_up(np.zeros(len(runs), dtype=int)).tolist() == runs.tolist()
+
+
 def test_regressors_that_merge_are_told_of_the_shares_that_whole_runs_take(monkeypatch: pytest.MonkeyPatch):
     problem = duration_problem(np.tile(np.eye(2), (3, 1, 1)), run_s=[20.0, 30.0, 50.0], total_s=200.0)
     asked: list[Array] = []

@@ -128,6 +128,21 @@ def test_each_flaw_is_named(spoil, word):
     assert any(word in problem for problem in found.problems), found.problems
 
 
+def test_the_time_of_the_least_clearance_is_in_seconds_whatever_the_sample_time():
+    """The same trial at half the sample time, in water that ends ahead of the goal."""
+    plan = sound()
+    plan["area"] = area(shapely.box(-100, -100, 100, plan["trajectory"].pose[:, 0].max() + 25.0))
+    half = replace(plan["vessel"], sample_time_s=plan["vessel"].sample_time_s / 2.0)
+    commands = replace(
+        plan["commands"], values=np.repeat(plan["commands"].values, 2, axis=0), sample_time_s=half.sample_time_s
+    )
+    finer = {**plan, "vessel": half, "commands": commands, "trajectory": simulate(half, commands)}
+    for found in (check(plan), check(finer)):
+        (said,) = (problem for problem in found.problems if "from forbidden water" in problem)
+        assert f"at {found.clearance_time_s:.0f} s, " in said
+        assert found.clearance_time_s == pytest.approx(check(plan).clearance_time_s, abs=plan["vessel"].sample_time_s)
+
+
 def test_a_shifted_track_does_not_pass_for_the_commands_motion():
     plan = sound()
     found = check({**plan, "trajectory": bent(plan["trajectory"], "pose", 1, 3.0)})
