@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.monitoring import KINDS, Grams
+from expdesign.export.monitor_content import Moment, MonitorContent
+from expdesign.monitoring import KINDS, Alarm, Calibration, Change, Grams, Rules, State, Step, watch
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, draw_weather, measure, simulate
@@ -135,3 +136,38 @@ def voyage_record(
         pose=np.column_stack([told["north_m"], told["east_m"], np.unwrap(told["heading_rad"])]),
     )
     return Record(batches=(batch,), notes=())
+
+
+def watched(
+    calibration: Calibration, grams: Grams, limit: float, state: State | None = None, *, port_s: float = np.inf
+) -> tuple[State, tuple[Alarm, ...], tuple[Step, ...]]:
+    """All stretches, the error of the changed ship being linear in its changes."""
+    state = State.begun(calibration, time_s=0.0) if state is None else state
+    alarms, steps, first = list[Alarm](), list[Step](), 0
+    while first < len(grams):
+        rest = grams.part(slice(first, None))
+        after = np.eye(rest.products.shape[-1])
+        after[:CHANGES, -1] = -state.shift
+        linearised = replace(rest, products=after.T @ rest.products @ after)
+        state, more, sums, used = watch(calibration, state, linearised, rules=Rules(limit=limit, port_s=port_s))
+        alarms, steps, first = [*alarms, *more], [*steps, *sums], first + used
+    return state, tuple(alarms), tuple(steps)
+
+
+def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], tuple[Step, ...]], limit: float):
+    """What is told of a watch."""
+    state, alarms, steps = ends
+    changes = tuple(
+        Change(effect=f"theta:p{n}", size=0.1, unit=(0.01, "%"), words=f"parameter p{n}", whole=1.0)
+        for n in range(CHANGES)
+    )
+    moments = [
+        Moment(time_s=step.time_s, statistic=step.statistic, value=np.zeros(CHANGES), std=np.ones(CHANGES))
+        for step in steps
+        if step.compared
+    ]
+    return MonitorContent(
+        vessel="drawn", changes=changes, calibration=calibration, reference_s=0.0, state=state, limit=limit,
+        false_alarm_days=1.0, alarms=alarms, moments=tuple(moments), left_out_rows=0, unread_rows=0, notes=(),
+        command="",
+    )  # fmt: skip

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json, sentences
+from expdesign.export.monitor_content import MonitorContent, monitor_json, sentences
 from expdesign.export.monitor_page import MOST_LINEAR, monitor_document, statistic_figure
 from expdesign.export.pages import document_html
 from expdesign.export.pages.figures import report_style
@@ -18,12 +18,10 @@ from expdesign.monitoring import (
     AS_LIKELY,
     Alarm,
     Calibration,
-    Change,
     Grams,
     RollWatch,
     Rules,
     State,
-    Step,
     calibrate,
     calls_of,
     cusum,
@@ -37,7 +35,7 @@ from expdesign.monitoring.alarms import beside_baseline
 from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE
 from expdesign.monitoring.force import Force
 from expdesign.monitoring.rolled import RollEvent
-from monitoring_case import CHANGES, FORCES, STRETCH_S, drawn_columns, drawn_grams, grams_from
+from monitoring_case import CHANGES, FORCES, STRETCH_S, content_of, drawn_columns, drawn_grams, grams_from, watched
 
 NOISE = np.array([1.0, np.inf, np.inf, np.inf])
 FORCE = Force(variance=np.array([0.09, 0.09, 0.04, 0.04]), time_s=np.array([300.0, 300.0, 43200.0, 43200.0]))
@@ -46,22 +44,6 @@ FORCE = Force(variance=np.array([0.09, 0.09, 0.04, 0.04]), time_s=np.array([300.
 @pytest.fixture(scope="module")
 def calibration() -> Calibration:
     return calibrate(drawn_grams(600, seed=0))
-
-
-def watched(
-    calibration: Calibration, grams: Grams, limit: float, state: State | None = None, *, port_s: float = np.inf
-) -> tuple[State, tuple[Alarm, ...], tuple[Step, ...]]:
-    """All stretches, the error of the changed ship being linear in its changes."""
-    state = State.begun(calibration, time_s=0.0) if state is None else state
-    alarms, steps, first = list[Alarm](), list[Step](), 0
-    while first < len(grams):
-        rest = grams.part(slice(first, None))
-        after = np.eye(rest.products.shape[-1])
-        after[:CHANGES, -1] = -state.shift
-        linearised = replace(rest, products=after.T @ rest.products @ after)
-        state, more, sums, used = watch(calibration, state, linearised, rules=Rules(limit=limit, port_s=port_s))
-        alarms, steps, first = [*alarms, *more], [*steps, *sums], first + used
-    return state, tuple(alarms), tuple(steps)
 
 
 @pytest.mark.thorough
@@ -277,25 +259,6 @@ def test_the_size_of_a_large_change_is_right_once_it_is_simulated(calibration: C
     assert mean[True] < 3.0 / np.sqrt(12)
     assert np.mean(np.square(far[True])) < 1.0 + 3.0 * np.sqrt(2.0 / 12)
     assert mean[False] > 3.0 / np.sqrt(12)
-
-
-def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], tuple[Step, ...]], limit: float):
-    """What is told of a watch."""
-    state, alarms, steps = ends
-    changes = tuple(
-        Change(effect=f"theta:p{n}", size=0.1, unit=(0.01, "%"), words=f"parameter p{n}", whole=1.0)
-        for n in range(CHANGES)
-    )
-    moments = [
-        Moment(time_s=step.time_s, statistic=step.statistic, value=np.zeros(CHANGES), std=np.ones(CHANGES))
-        for step in steps
-        if step.compared
-    ]
-    return MonitorContent(
-        vessel="drawn", changes=changes, calibration=calibration, reference_s=0.0, state=state, limit=limit,
-        false_alarm_days=1.0, alarms=alarms, moments=tuple(moments), left_out_rows=0, unread_rows=0, notes=(),
-        command="",
-    )  # fmt: skip
 
 
 def test_a_large_alarm_does_not_hide_the_threshold_on_the_page(calibration: Calibration) -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from expdesign.export.monitor_content import MonitorContent, monitor_json, sentences
 from expdesign.monitoring import Calibration, calibrate, restored_state, saved, threshold
-from monitoring_case import CHANGES, STRETCH_S, drawn_columns, drawn_grams, grams_from
-from test_monitoring_alarms_are_rare_and_right import content_of, watched
+from monitoring_case import CHANGES, STRETCH_S, content_of, drawn_columns, drawn_grams, grams_from, watched
 
 LIMIT = threshold(CHANGES, 1e4)
 SINCE, UNTIL, LATER, COUNT = 30, 46, 66, 96
