@@ -141,7 +141,7 @@ def test_what_is_wrong_with_a_variant_is_said_before_anything_is_planned(tmp_pat
 
 def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
     path = variant(tmp_path, "model-ship", "[design]\n")
-    with pytest.raises(InputError, match="'model-ship' is given to 2 cases"):
+    with pytest.raises(FileError, match=r"scenario.name: is 'model-ship' as in model-ship.toml, expected another"):
         workflows.whatif(MODEL_SHIP, [path], tmp_path, jobs=1)
     with pytest.raises(InputError, match="no VARIANT"):
         workflows.whatif(MODEL_SHIP, [], tmp_path, jobs=1)

@@ -57,9 +57,11 @@ def whatif(request: requests.WhatIf, *, progress: Progress = silent) -> Outcome:
     base = load_scenario(request.scenario)
     cases = [(base, ()), *(load_variant(request.scenario, variant) for variant in request.variants)]
     names = [case.name for case, _ in cases]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
+    paths = (request.scenario, *request.variants)
+    for place, name in enumerate(names):
+        if (first := names.index(name)) < place:
+            problem = f"is {name!r} as in {paths[first].name}, expected another name for each case"
+            raise FileError(paths[place], "scenario.name", problem)
     done: dict[str, Case] = {}
     searched = SEARCHED if request.with_plan and base.design.accuracy else 0.0
     with (
