@@ -104,6 +104,7 @@ def test_a_parameter_without_information_is_named(
     line = line_of(capsys)
     assert "Y_mu" in line
     assert "contain no information" in line
+    assert "fix Y_mu (--fixed keeps parameters at the values of the vessel file)" in line
     assert not out.exists()
     assert main([*arguments, "--fixed", "Y_mu"]) == 0
 

@@ -91,11 +91,13 @@ def test_what_is_unseen_is_named_with_its_combination() -> None:
     with pytest.raises(NotInformative, match=r"0\.71 [ab] - 0\.71 [ab]") as caught:
         solve_iv(twin, steered)
     assert set(caught.value.parameters) == {"a", "b"}
+    assert str(caught.value).endswith("excite them, or fix b")  # one of each combination is enough
     Phi[..., 1], Phi[..., 3] = 5.0, 0.0
     silent = Regression(parameters=NAMES, Phi=Phi, y=case.y, batch=case.batch)
     with pytest.raises(NotInformative) as caught:
         solve_iv(silent, Phi.copy(), Weighting(mean="complete"))
     assert set(caught.value.parameters) == {"b", "d"}
+    assert str(caught.value).endswith("or fix b d")
 
 
 def test_lags_do_not_cross_batches_or_see_gaps_as_neighbours() -> None:

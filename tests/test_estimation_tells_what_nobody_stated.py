@@ -121,6 +121,16 @@ def test_other_methods_are_biased_alike_and_tell_the_same(methods: tuple[str, ..
     assert told.current is None
 
 
+@pytest.mark.parametrize("methods", [("oe",), ("ls",)])
+def test_estimates_joined_with_a_prior_are_compared_with_such(methods: tuple[str, ...]) -> None:
+    sure = replace(SHIP.model, parameter_std=1e-6 * np.abs(SHIP.model.parameters))
+    ship, raw = replace(SHIP, model=sure), run(1, current_to=(0.3, -0.4))
+    options = replace(OPTIONS, methods=methods, prior="parameter_std")
+    told = with_unstated(ship, raw, options, assess(ship, reduced(raw, ship), options))
+    assert told.current is None  # nothing moves what is known so well
+    assert found(raw, SHIP, methods=methods).current is not None
+
+
 def test_what_could_not_be_asked_is_told_and_the_rest_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assessing = import_module("expdesign.assessment.assess")
     raw, attempted = run(1, current_to=(0.3, -0.4)), assessing.attempted

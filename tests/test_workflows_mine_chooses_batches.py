@@ -1,8 +1,10 @@
 """`expdesign mine`: which recorded runs to estimate from again."""
 
 import json
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,11 +26,13 @@ SHIP = SCENARIOS / "vessels" / "model-ship.toml"
 FORCES = ("tau_x", "tau_y", "tau_psi")
 
 
-def sailed(number: int, seed: int = 0, environment: Environment = CALM) -> Batch:
-    """What the true model ship's sensors tell of one primitive."""
+def sailed(number: int, seed: int = 0, environment: Environment = CALM, *, noise: float = 1.0) -> Batch:
+    """What the true model ship's sensors tell of one primitive, with so much of their noise."""
+    ship = vessel("model-ship-true")
+    own = {name: noise * getattr(ship.sensors, name) for name in ("velocity_mps", "yaw_rate_radps", "heading_rad")}
     primitive = example_dictionary("model-ship")[number]
     return simulate_ensemble(
-        vessel("model-ship-true"),
+        replace(ship, sensors=replace(ship.sensors, **own)),
         np.concatenate([primitive.commands.values, primitive.commands.values[-1:]]),
         runs=1,
         environment=environment,
@@ -74,6 +78,33 @@ def test_pieces_are_the_batch_cut_up():
     assert in_pieces(Record(batches=(batch,)), 1e6).batches == (batch,)
     with pytest.raises(InputError, match="three samples"):
         in_pieces(Record(batches=(batch,)), 0.2)
+
+
+@pytest.mark.parametrize("fault", [(1.0, 1.0, 1.1), (0.9, 0.9, 1.0)])
+def test_a_run_whose_instruments_disagree_is_not_chosen(
+    fault: tuple[float, float, float], files: list[Path], tmp_path: Path
+) -> None:
+    """It ranked first: what a fault adds to a motion counts as information. Where it is needed, it is taken."""
+
+    def told(paths: list[Path], keep: int) -> dict[str, Any]:
+        mine(paths, tmp_path / f"{keep}", vessel=SHIP, keep=keep)
+        return json.loads((tmp_path / f"{keep}" / "mining.json").read_text())
+
+    best = told(files, 3)
+    wrong = next(name for name in best["chosen"] if name not in ("run0.csv", "run1.csv"))  # which sail straight ahead
+    assert best["in_doubt"] == {}
+    paths = [tmp_path / path.name for path in files]
+    for path in paths:
+        batch = sailed(int(path.stem[3:]), noise=0.03)
+        own = np.array(fault) if path.name == wrong else np.ones(3)
+        path.write_text(record_csv([replace(batch, velocity=batch.velocity * own)]))
+    found = told(paths, 4)
+    assert [*found["in_doubt"]] == [wrong]
+    assert wrong not in found["chosen"]
+    assert {row["name"] for row in found["batches"]} == {path.name for path in files} - {wrong}
+    assert found["notes"][0].startswith("Left out of the choice, because instruments of the file disagree")
+    assert wrong in found["notes"][0]
+    assert len(told(paths, 8)["chosen"]) == 8
 
 
 def test_the_chosen_are_those_of_largest_information_and_can_be_estimated_from(files: list[Path], tmp_path: Path):

@@ -200,7 +200,8 @@ def with_unstated(
     def again(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
         work = Work(vessel=ship, stated=ship, record=record, options=replace(options, horizon_s=own.horizon_s))
         begun = Begun(values=held.values, horizon_s=own.horizon_s)
-        return attempted(work, ship, work.seen(record), method, times=times, begun=begun)
+        free = attempted(work, ship, work.seen(record), method, times=times, begun=begun)
+        return _informed(free, ship, options)  # as the one that it is compared with
 
     try:
         if not method.weather.steady:
@@ -235,7 +236,12 @@ def _output_error_of(vessel: Vessel, options: EstimateOptions, found: Assessment
     if method is None or sum(map(len, record.batches)) > MOST_BY_ITSELF:
         return None
     own = attempted(work, vessel, record, method, times=known_times(vessel, vessel, found.record))
-    return Trial(method=method, horizon_s=horizon_s, found=own, start="")
+    return Trial(method=method, horizon_s=horizon_s, found=_informed(own, vessel, options), start="")
+
+
+def _informed(found: Estimate, vessel: Vessel, options: EstimateOptions) -> Estimate:
+    """An estimate joined with the vessel file's prior, where that is asked for."""
+    return with_prior(found, vessel.model) if options.prior == PARAMETER_STD else found
 
 
 def _kept(trials: Sequence[Trial], beside: Sequence[Trial], best: Sequence[int]) -> list[Trial]:
@@ -287,9 +293,8 @@ def preferred(found: Sequence[Assessed], compared: Sequence[HeldOut] = ()) -> in
 
 
 def _assessed(work: Work, tests: Record, trial: Trial) -> Assessed:
-    vessel, record, options, method, found = work.vessel, work.record, work.options, trial.method, trial.found
-    if options.prior == PARAMETER_STD:
-        found = with_prior(found, vessel.model)
+    vessel, record, options, method = work.vessel, work.record, work.options, trial.method
+    found = _informed(trial.found, vessel, options)
     wind = method.weather.wind
     now = with_times(vessel, found_times(found, vessel))
     found = with_held_noted(with_times_noted(found, record, work.stated, vessel), record, work.stated)

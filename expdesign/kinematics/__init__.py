@@ -9,5 +9,5 @@ it is watched for, what two instruments show of a third in all files together: t
 a log is.
 """
 
-from expdesign.kinematics.check import checked, in_stated_time
+from expdesign.kinematics.check import checked, in_doubt, in_stated_time
 from expdesign.kinematics.held import held

@@ -237,6 +237,16 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: boo
     return replace(record, notes=(*doubts, *record.notes), doubts=doubts, faults=tuple(faults), shown=shown)
 
 
+def in_doubt(record: Record) -> dict[str, tuple[str, ...]]:
+    """Batches of files whose instruments disagree as those of other files do not: name -> what is said of the file."""
+    said = [(text.partition(": ")[0], text) for text in record.faults]
+    found = {
+        batch.name: tuple(text for file, text in said if batch.name == file or batch.name.startswith(f"{file}, "))
+        for batch in record.batches
+    }
+    return {} if all(found.values()) else {name: texts for name, texts in found.items() if texts}
+
+
 def _what_is_done(item: Finding) -> str:
     """A sentence on what is undone of a finding; "" for nothing."""
     if item.name in SCALES:

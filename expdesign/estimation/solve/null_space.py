@@ -121,8 +121,12 @@ def require_informative(found: NullSpace) -> None:
         return
     names = tuple(dict.fromkeys(name for direction in found.unseen for name in direction.parameters))
     listed = "; ".join(str(direction) for direction in found.unseen)
+    kept: list[str] = []  # of each combination one, with which the others are determined
+    for direction in found.unseen:
+        kept += sorted(set(direction.parameters) - set(kept))[-1:]  # rudder2 rather than rudder1
     raise NotInformative(
-        f"the data contain no information about these parameters or combinations: {listed}; excite them, or fix some",
+        f"the data contain no information about these parameters or combinations: {listed}; excite them, or fix "
+        f"{' '.join(sorted(kept))}",
         parameters=names,
     )
 

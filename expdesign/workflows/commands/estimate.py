@@ -6,7 +6,7 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind, with_unstated
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import methods_for
 from expdesign.export.estimate_page import estimate_document
 from expdesign.export.files import estimate_json, estimated_vessel
@@ -49,7 +49,11 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
         now, record = settled(ship, raw, options, smoothed=smoothed, progress=within(progress, 0.01, 0.4))
         apart = reduced_data(request.tests, now, velocity=request.velocity) if request.tests else NO_TESTS
         begun = 0.01 if now is ship else 0.4
-        found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.65))
+        try:
+            found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.65))
+        except NotInformative as error:
+            how = " (--fixed keeps parameters at the values of the vessel file)" if error.parameters else ""
+            raise NotInformative(f"{error}{how}", parameters=error.parameters) from None
         progress("looking for what is not stated", 0.65)
         found = with_unstated(now, raw, options, found, smoothed=smoothed)
     progress("drawing the report", 0.7)

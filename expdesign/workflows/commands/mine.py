@@ -27,6 +27,7 @@ from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import durations_json, finite, record_csv, recorded_dictionary_json, subsets_json
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, by_label, recorded_information
+from expdesign.kinematics import in_doubt
 from expdesign.progress import Progress, silent, within
 from expdesign.records import row_labels
 from expdesign.reduction import at_reference_point
@@ -286,18 +287,42 @@ def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progr
     batches = recorded_information(seen, ship.model, names, predictor="basic-wind" if windy else "basic")
     _need_every_parameter(batches, names)
     progress("choosing among them", 0.6)
-    subset = best_subset(batches, names, size=request.keep, mean_subtraction=request.mean)
+    subset, doubted_of = _best_sound(batches, names, in_doubt(record), request)
     chosen = [batch for batch in record.batches if batch.name in subset.chosen]
+    notes = (*([LEFT_OUT.format(", ".join(doubted_of))] if doubted_of else []), *record.notes)
     content = {
         **_content(subset, batches, names, unseen, mean=request.mean, command=repeating(request)),
-        "notes": list(record.notes),
+        "in_doubt": {name: list(texts) for name, texts in doubted_of.items()},
+        "notes": list(notes),
     }
     files = {
         "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "chosen.csv": record_csv(chosen),
     }
-    document = _document(content, _table(subset, batches), record.notes)
+    document = _document(content, _table(subset, batches), notes)
     return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
+
+
+LEFT_OUT = (
+    "Left out of the choice, because instruments of the file disagree as those of the others do not: {}. What a fault "
+    "adds to a motion counts as information."
+)
+
+
+def _best_sound(
+    batches: Sequence[BatchInformation],
+    names: Sequence[str],
+    doubts: Mapping[str, tuple[str, ...]],
+    request: requests.Mine,
+) -> tuple[Subset, Mapping[str, tuple[str, ...]]]:
+    """The best of batches that are in no doubt, and those that are; the best of all where too few are left."""
+    sound = [batch for batch in batches if batch.name not in doubts]
+    if doubts and len(sound) >= request.keep:
+        try:
+            return best_subset(sound, names, size=request.keep, mean_subtraction=request.mean), doubts
+        except NotInformative:
+            pass  # only with the others do they inform about every parameter
+    return best_subset(batches, names, size=request.keep, mean_subtraction=request.mean), {}
 
 
 SYMMETRIC = "symmetric part of the information"
