@@ -32,6 +32,7 @@ STORY = SCENARIOS / "story.toml"
 NOMINAL, TRUE = SCENARIOS / "vessels/tender-20m.toml", SCENARIOS / "vessels/tender-20m-true.toml"
 MISSING, CURRENT = "Y_abs_v_v", ("north_mps", "east_mps")
 UNTIL_S, REMAINING_S = 600.0, 240.0
+NAMED = 0.75  # share of trials in which both causes are named, at least
 
 
 @pytest.fixture
@@ -39,11 +40,11 @@ def story(made_once):
     def tell(folder):
         first, second, found = (folder / name for name in ("first", "second", "found"))
         shutil.copytree(example_run(made_once, "story")[0], first)
-        strayed = workflows.simulate(first / "plan.json", None, truth=TRUE, until_s=UNTIL_S, seed=2)
+        strayed = workflows.simulate(first / "plan.json", None, truth=TRUE, until_s=UNTIL_S, seed=3)
         data, extended = [first / "measured.csv"], found / "vessel-extended.toml"
         workflows.diagnose(data, found, vessel=NOMINAL, scenario=STORY)
         workflows.replan(STORY, second, data=data, vessel=extended, remaining_s=REMAINING_S, seed=1)
-        again = workflows.simulate(second / "plan.json", None, truth=TRUE, seed=3)
+        again = workflows.simulate(second / "plan.json", None, truth=TRUE, seed=4)
         return strayed.summary, again.summary
 
     folder, (strayed, again) = made_once("story-goes-on", tell)
@@ -109,9 +110,12 @@ def test_a_second_diagnosis_finds_nothing_new(story, tmp_path):
 
 @pytest.mark.slow
 def test_second_diagnoses_are_silent_as_often_as_tests_say(story, tmp_path):
-    """First and second diagnoses of new trials: alarms are binomial at the level of tests, up to the 99.9 % point."""
+    """First and second diagnoses of new trials: alarms are binomial at the level of tests, up to the 99.9 % point.
+
+    First ones name both causes in most trials: data of two runs do not always show how these differ.
+    """
     folder, *_ = story
-    trials, alarms = 12, 0
+    trials, alarms, named = 12, 0, 0
     for trial in range(trials):
         here = tmp_path / str(trial)
         for number, name in enumerate(("first", "second")):
@@ -119,10 +123,13 @@ def test_second_diagnoses_are_silent_as_often_as_tests_say(story, tmp_path):
                 folder / "first/plan.json", here / name, truth=TRUE, until_s=UNTIL_S, seed=100 + 2 * trial + number
             )
         workflows.diagnose([here / "first/measured.csv"], here / "found", vessel=NOMINAL)
+        causes = {item["cause"] for item in read(here / "found/diagnosis.json")["findings"]}
+        named += causes >= {"current", f"missing_term:{MISSING}"}
         extended = here / "found/vessel-extended.toml"
         workflows.diagnose([here / "second/measured.csv"], here / "again", vessel=extended)
         alarms += bool(read(here / "again/diagnosis.json")["findings"])
     assert alarms <= binom.isf(1e-3, trials, SELECTION_TUNING.level)
+    assert named >= binom.ppf(1e-3, trials, NAMED)
 
 
 def test_the_rest_begins_where_the_data_end_and_counts_on_the_current_found(story):
