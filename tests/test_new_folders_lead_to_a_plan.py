@@ -231,7 +231,7 @@ def test_the_draft_of_a_first_trial_tries_no_other_prior(tmp_path: Path, monkeyp
     def refused_once(first: Scenario, *_) -> day.Day:
         if not tried:
             tried.append(first)
-            raise NoPlan("no way")
+            raise NoPlan("no way", place=(1.0, 2.0))
         return calibrated(first)
 
     monkeypatch.setattr(day, "whole_trial", lambda *_: None)
@@ -246,10 +246,11 @@ def test_the_draft_of_a_first_trial_tries_no_other_prior(tmp_path: Path, monkeyp
         assert ("half the standard deviations" in note) is not draft
         tried = []
         monkeypatch.setattr(day, "_calibrated", refused_once)
-        with pytest.raises(
-            NoPlan, match=r"parameter_std\) a first trial is drafted" if draft else "do not help either"
-        ):
+        told = "parameter_std) a first trial is drafted" if draft else "do not help either"
+        with pytest.raises(NoPlan, match=re.escape(told)) as caught:
             day.planned_day(case, (), None)
+        assert caught.value.place == (1.0, 2.0)
+        assert told in caught.value.remedies[0]
         monkeypatch.setattr(day, "_calibrated", calibrated)
 
 

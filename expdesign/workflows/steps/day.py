@@ -112,7 +112,9 @@ def _first_day(
     try:
         day = _calibrated(case, stated, seed, first)
     except NoAnswer as error:
-        raise NoPlan(f"{error}; {_with_narrower_prior(case, stated, seed, advising)}") from error
+        refused = error if isinstance(error, NoPlan) else NoPlan(str(error))
+        refused.remedies += (_with_narrower_prior(case, stated, seed, advising),)
+        raise refused from None
     if day.plan.verified or day.plan.draft:
         return day
     return replace(day, note=f"{day.note}; {_with_narrower_prior(case, stated, seed, advising)}")
