@@ -45,6 +45,7 @@ def test_kinds_follow_from_thrusters_and_rudders() -> None:
         "macginitie": "azimuth",
         "offshore-45m": "azimuth",
         "naval-vessel": "twin-screw",
+        "car-carrier": "twin-screw",
     }
     assert kinds == dict.fromkeys(kinds, "propeller-rudder") | others
 

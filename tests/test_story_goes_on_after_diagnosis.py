@@ -42,7 +42,9 @@ def story(made_once):
         shutil.copytree(example_run(made_once, "story")[0], first)
         strayed = workflows.simulate(first / "plan.json", None, truth=TRUE, until_s=UNTIL_S, seed=3)
         data, extended = [first / "measured.csv"], found / "vessel-extended.toml"
-        workflows.diagnose(data, found, vessel=NOMINAL, scenario=STORY)
+        workflows.simulate(first / "plan.json", folder / "twice", truth=TRUE, until_s=UNTIL_S, seed=2)
+        both = [*data, folder / "twice/measured.csv"]  # one alone names both causes in three of four draws
+        workflows.diagnose(both, found, vessel=NOMINAL, scenario=STORY)
         workflows.replan(STORY, second, data=data, vessel=extended, remaining_s=REMAINING_S, seed=1)
         again = workflows.simulate(second / "plan.json", None, truth=TRUE, seed=4)
         return strayed.summary, again.summary
