@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from expdesign.plan.legs import LegTask
+from expdesign.plan.legs.water import acceptable
 from expdesign.plan.resimulation import OFF_RAD, Resimulation, _in_stretches, resimulated
 from expdesign.plan.values import Leg, SailedTrial
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, integrate_motion, simulate
 from expdesign.vessel import Vessel
-from helm_case import offshore_vessel
+from helm_case import offshore_vessel, open_water
+from plan_case import find_leg
 
 SAMPLES, SPEED_MPS = 900, 3.0
 START = (SPEED_MPS, 0.0, 0.0)
@@ -125,3 +128,20 @@ def test_a_course_that_drifts_slowly_is_found_by_where_it_leads(angle_rad):
     )
     assert apart.off_rad.max() < OFF_RAD
     assert found.problems(vessel.length_m)
+
+
+def test_a_long_leg_of_an_unstable_ship_is_steered_and_arrives():
+    """Commands that hold a stable ship on a straight lead this one off it, and IPOPT finds none for all of the leg."""
+    vessel = ship(unstable=True)
+    water, length = open_water(vessel), vessel.length_m
+    ahead, rest = water.ship.approach, np.zeros(len(vessel.limits))
+    start = np.array([-28 * length, -6 * length, 0.0, *ahead.velocity])
+    off = start + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-9])
+    end = np.array([26 * length, 4 * length, 0.4, 0.0, 0.0, 0.0])
+    held = np.tile(ahead.inputs, (int(20 * length / water.ship.transit_speed_mps / vessel.sample_time_s), 1))
+    assert np.abs(water.states(off, held)[-1][2:] - start[2:]).max() > 1e4 * 1e-9
+    task = LegTask(start=start, end=end, start_inputs=ahead.inputs, end_inputs=rest, seed=1)
+    values = find_leg(task, water)
+    assert values is not None
+    assert acceptable(start, end, water, values, task.past)
+    assert task.budget.spent_s < 10.0

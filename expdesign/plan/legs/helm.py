@@ -6,8 +6,7 @@ ship's own turning radius between straights: one to accelerate, one in which the
 ship stops. Optimisation starts from steady turns along it. The last part before a run is the run-up of the standard
 trials: steady speed, helm as it holds the course, engines as the run begins with.
 
-On long straights the ship is steady at transit speed, with commands that hold it. There is nothing to optimise, and
-IPOPT sometimes ends without an answer for a leg of a hundred hull lengths.
+Long straights are not optimised, see `transit`.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.recovery import STRAIGHT_OFF_HULLS, Recovery, recover
+from expdesign.plan.legs.transit import long_straight
 from expdesign.plan.legs.water import (
     ARRIVAL,
     FoundLeg,
@@ -35,9 +35,9 @@ from expdesign.plan.legs.water import (
     nearest_turns,
     through_water,
 )
-from expdesign.simulation import Helm, to_body
-from expdesign.values import Array, seal
-from expdesign.vessel import NUMPY, Vessel
+from expdesign.simulation import Helm
+from expdesign.values import Array
+from expdesign.vessel import Vessel
 
 SLOW_SHARE = 0.3  # transit speeds below which a helm-steered ship is about to accelerate from rest or to stop
 # shares tried of `straight_off_hulls`, of the hull lengths to settle before a run-up, and of the stopping distance
@@ -53,80 +53,6 @@ STRAIGHTS = (
 ROOM_SHARES = (1.0, 0.25)
 HELM_NODE = 0.25  # time between nodes of helm-steered legs, in that of a hull length at transit speed
 EASED_HULLS = 1.0  # hull lengths over which their first guess eases into turns
-TRANSIT_HULLS = 20.0  # shortest straight that is sailed with constant commands, in hull lengths
-TRANSIT_ENDS_HULLS = 6.0  # of straights before and after it that are optimised with the rest of the leg
-STRAIGHT_RAD = 1e-6  # change of course from point to point of a path from which on it bends
-HEADING_ROUNDS = 8  # of the search for the heading that makes good a course in a current
-
-
-# The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Transit:
-    """A steady part of a leg."""
-
-    to: Array  # (i, 3) places and courses of the leg's path before it
-    states: Array  # (k + 1, 6) at every sample
-    commands: Array  # (k, m), all the same
-    on: Array  # (j, 3) places and courses of the path after it; the first is where the ship then is
-
-    def __post_init__(self) -> None:
-        seal(self, to="i 3", states="n 6", commands="k m", on="j 3")
-
-
-def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShip) -> Transit | None:
-    """The longest straight of a path (k, 3), if it is long and the ship keeps its course and speed on it.
-
-    Args:
-        path: places and courses from the leg's start to its end.
-        braking_m: length at its end on which the ship slows down.
-
-    Returns:
-        None where every straight is short, or wind turns or slows the ship.
-    """
-    hull_m = water.vessel.length_m
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
-    first, last = _longest_straight(along, path[:, 2])
-    gather_m = ship.transit_speed_mps**2 / (2.0 * ship.acceleration_mps2)
-    begin = max(along[first], gather_m) + TRANSIT_ENDS_HULLS * hull_m
-    end = min(along[last], along[-1] - braking_m) - TRANSIT_ENDS_HULLS * hull_m
-    if end - begin < TRANSIT_HULLS * hull_m:
-        return None
-    course = float(path[first, 2])
-    place = path[first, :2] + (begin - along[first]) * np.array([np.cos(course), np.sin(course)])
-    start = _steady_state(place, course, water, ship)
-    count = int((end - begin) / (float(np.hypot(*start[3:5])) * water.vessel.sample_time_s))
-    commands = np.tile(ship.approach.inputs, (count, 1))
-    states = water.states(start, commands)
-    scale = np.r_[1.0, [ship.transit_speed_mps] * 2, ship.yaw_rate_radps]
-    if (np.abs(states[-1] - start)[2:] > ARRIVAL / 10 * scale).any():
-        return None
-    return Transit(
-        to=np.vstack([path[along < begin], [*place, course]]),
-        states=states,
-        commands=commands,
-        on=np.vstack([[*states[-1, :2], course], path[along > end]]),
-    )
-
-
-def _longest_straight(along: Array, course: Array) -> tuple[int, int]:
-    """Indices of the points between which a path keeps its course longest."""
-    bends = np.flatnonzero(np.abs(np.diff(course)) > STRAIGHT_RAD)
-    ends = np.r_[bends, len(course) - 1]  # a bend lies between its point and the next
-    begins = np.r_[0, bends + 1]
-    longest = int(np.argmax(along[ends] - along[begins]))
-    return int(begins[longest]), int(ends[longest])
-
-
-def _steady_state(place: Array, course: float, water: LegWater, ship: HelmShip) -> Array:
-    """(6,) the ship at a place (2,) at transit speed through water, heading so that it makes good a course [rad]."""
-    velocity, heading = np.zeros(3), course
-    for _ in range(HEADING_ROUNDS):
-        current = to_body(water.environment.current_to, heading, NUMPY)
-        velocity = ship.approach.velocity + np.array([*current, 0.0])
-        heading = course - float(np.arctan2(velocity[1], velocity[0]))
-    return np.array([*place, heading, *velocity])
 
 
 def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> FoundLeg | None:
@@ -151,28 +77,27 @@ def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> FoundLeg | None:
 
 
 def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, share: float) -> Array | None:
-    """Commands (k, m) along a path (j, 3): optimised, but for a long straight, on which they are constant.
+    """Commands (k, m) along a path (j, 3): optimised, but for a long straight.
 
     None where none are found in a share of the room beside the path.
     """
     braking_m = ship.stopping_m if _stops(task, water) else 0.0
-    transit = steady_transit(path, braking_m, water, ship)
+    transit = long_straight(path, braking_m, water, ship)
     if transit is None:
         problem = _problem(task, water, ship, check, path, share)
         doubtful = problem.guesses == 1 and task.budget.spent_s > 0.0  # one such attempt on a leg is enough
         return None if doubtful else solve_leg(problem)
-    steady = transit.commands[0]
-    before = solve_leg(
-        _problem(replace(task, end=transit.states[0], end_inputs=steady), water, ship, check, transit.to, share)
-    )
-    if before is None:
+    begin = replace(task, end=transit.start, end_inputs=ship.approach.inputs)
+    before = solve_leg(_problem(begin, water, ship, check, transit.to, share))
+    held = None if before is None else transit.held(task, before, water, ship)
+    if before is None or held is None:
         return None
-    held = transit.commands + (before[-1] - steady)
-    past = water.remembered(np.concatenate([task.past, before, held]))
-    rest = replace(task, start=transit.states[-1], start_inputs=past[-1], before=past)
-    at_once = Recovery(states=rest.start[None], commands=np.empty((0, len(steady))))
-    after = solve_leg(_problem(rest, water, ship, at_once, transit.on, share))
-    return None if after is None else np.concatenate([before, held, after])
+    commands, state = held
+    past = water.remembered(np.concatenate([task.past, before, commands]))
+    rest = replace(task, start=state, start_inputs=past[-1], before=past)
+    at_once = Recovery(states=state[None], commands=np.empty((0, len(past[-1]))))
+    after = solve_leg(_problem(rest, water, ship, at_once, transit.on_from(state), share))
+    return None if after is None else np.concatenate([before, commands, after])
 
 
 def _stops(task: LegTask, water: LegWater) -> bool:
