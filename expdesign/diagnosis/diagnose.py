@@ -127,8 +127,11 @@ class Selected:
         return self.rest.kept.steps[len(self.kept.steps) :]
 
     def is_named(self, step: Step) -> bool:
-        """Whether parameters that are told as wrong are all that a cause changes."""
-        return self.wrong is not None and {*step.chosen.keys} <= {*self.wrong.step.chosen.keys}
+        """Whether parameters that are told as wrong are all that a cause changes, or it is another choice of them."""
+        if self.wrong is None:
+            return False
+        told = self.wrong.step.chosen
+        return step.chosen.candidate.cause == told.candidate.cause or {*step.chosen.keys} <= {*told.keys}
 
     @property
     def before(self) -> HeldOut:
