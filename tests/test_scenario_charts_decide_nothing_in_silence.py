@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +13,7 @@ from expdesign.errors import FileError, NoPlan
 from expdesign.plan.values import PlanSettings
 from expdesign.scenario import load_area, load_scenario
 from expdesign.scenario.scenario_file import berth_problem, build_berth
+from expdesign.sea_area import as_multipolygon
 from sample_files import outside
 from scenario_files import AREA, collection, feature, spoil, square, write_scenario
 
@@ -242,6 +244,12 @@ def swap_feature(number, folder):
     (folder / "chart.geojson").write_text(json.dumps(chart), encoding="utf-8")
 
 
+def swap_corner(number, folder):
+    chart = json.loads((folder / "chart.geojson").read_text(encoding="utf-8"))
+    chart["features"][number - 1]["geometry"]["coordinates"][0][2].reverse()
+    (folder / "chart.geojson").write_text(json.dumps(chart), encoding="utf-8")
+
+
 def swap_lines(name, folder):
     """Swap two numbers that a file states one after the other."""
     number = r"-?[\d.]+"
@@ -295,6 +303,8 @@ SWAPPED = {
     "land": (partial(swap_feature, 2), "feature 2 (layer 'land')"),
     "depth area": (partial(swap_feature, 3), "feature 3 (layer 'seabed20m')"),
     "danger": (partial(swap_feature, 4), "feature 4 (layer 'rocks')"),
+    "corner of land": (partial(swap_corner, 2), "feature 2 (layer 'land')"),
+    "corner of a depth area": (partial(swap_corner, 3), "feature 3 (layer 'seabed20m')"),
 }
 
 
@@ -308,6 +318,31 @@ def test_every_coordinate_with_its_numbers_swapped_is_refused_and_named(tmp_path
         load_scenario(path)
     assert caught.value.key == key
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("what", [name for name, (_, key) in SWAPPED.items() if key.startswith("feature")])
+def test_swapped_numbers_of_a_chart_are_named_where_no_bounds_are_given(tmp_path, what):
+    path = in_the_bay(tmp_path)
+    area = tmp_path / "area.toml"
+    area.write_text(re.sub(r"\[bounds\]\n(\w+_deg = .*\n)+", "", area.read_text(encoding="utf-8")), encoding="utf-8")
+    load_scenario(path)
+    change, key = SWAPPED[what]
+    change(tmp_path)
+    with pytest.raises(FileError, match="swapped") as caught:
+        load_scenario(path)
+    assert caught.value.key == key
+
+
+def test_a_place_in_the_area_is_not_called_swapped(tmp_path):
+    """Many a place has its mirror image in the area's water, too."""
+    case = load_scenario(in_the_bay(tmp_path))
+    zone = shapely.box(-420.0, 180.0, -380.0, 220.0)
+    area = replace(case.area, water=as_multipolygon(case.area.water.difference(zone)))
+    berth = build_berth(np.array([200.0, -400.0]), 0.0, area, degrees=False)
+    assert area.water.covers(berth.swapped(area))
+    said = berth_problem(berth, case.vessel, area, PlanSettings(), end=case.goal, way="a way to the goal")
+    assert "outside the allowed water" in said
+    assert "swapped" not in said
 
 
 def test_a_recorded_position_with_its_numbers_swapped_is_named(tmp_path):

@@ -302,7 +302,7 @@ def berth_problem(berth: Berth, vessel: Vessel, area: SeaArea, settings: PlanSet
         way: to it or from it, e.g. "a way to the goal".
     """
     pose, clearance_m = berth.pose, settings.clearance_m
-    swapped = f", {ORDER[berth.degrees]} swapped it is in the area" if area.water.covers(berth.swapped(area)) else ""
+    swapped = f", {ORDER[berth.degrees]} swapped it is in the area" if _is_swapped(berth, area) else ""
     if not np.isfinite(pose).all():
         return f"is thousands of kilometres from the area {area.name!r}{swapped}, expected a position in it"
     hull = shapely.Polygon(to_n_frame(vessel.hull_b, pose)[:, ::-1])
@@ -322,6 +322,15 @@ def berth_problem(berth: Berth, vessel: Vessel, area: SeaArea, settings: PlanSet
         problem = f"leaves {_metres(distance)} between the hull and forbidden water"
     remedy = _remedy(berth, vessel, area, settings, end, way)
     return f"{problem}, expected at least clearance_m = {clearance_m:g} around the hull; {remedy}"
+
+
+def _is_swapped(berth: Berth, area: SeaArea) -> bool:
+    """Whether a place outside the area lies in its water with its two numbers swapped.
+
+    In metres, many a place in the area has its mirror image there, too, which tells nothing.
+    """
+    outside = not shapely.box(*area.water.bounds).covers(shapely.Point(berth.pose[1::-1]))
+    return outside and bool(area.water.covers(berth.swapped(area)))
 
 
 ORDER = {True: "with latitude and longitude", False: "with north and east"}

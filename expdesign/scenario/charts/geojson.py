@@ -238,6 +238,7 @@ REPEATED = "repeated point", "removed"
 CLOSED = "ring", "closed"
 SPLIT = "polygon", "taken apart where it touches itself"
 MOVED = "polygon", "moved by a full turn: the chart crosses the antimeridian"
+FAR_DEG = 2.3  # of latitude, about the largest extent of a sea area
 WORDS = {
     "Ring Self-intersection": "crosses itself",
     "Interior is disconnected": "crosses itself",
@@ -348,7 +349,30 @@ def positions_of(positions: Any, entry: Entry) -> Array:
     if wrong.any():
         lon, lat = points[wrong][0, :2]
         raise entry.error(f"has the position [{lon:g}, {lat:g}], expected [longitude, latitude] in degrees")
+    _check_corners(points[:, :2], entry)
     return points
+
+
+def _check_corners(points: Array, entry: Entry) -> None:
+    """Refuse positions (k, 2) one of which is beside its neighbour only with its two numbers swapped.
+
+    Of the two ends of such a step, the wrong one is farther from where most positions are.
+    """
+    before, after = points[:-1], points[1:]
+    steps = np.flatnonzero(_far(before, after) & ~_far(before, after[:, ::-1]))
+    if not steps.size:
+        return
+    ends = points[steps[0] : steps[0] + 2]
+    lon, lat = max(ends.tolist(), key=lambda end: float(np.hypot(*(end - np.median(points, axis=0)))))
+    raise entry.error(
+        f"has the corner [{lon:g}, {lat:g}] far from the one beside it, expected [longitude, latitude]: with the two "
+        "swapped it lies beside it"
+    )
+
+
+def _far(first: Array, second: Array) -> np.ndarray:
+    """(k,) whether positions (k, 2) [deg] are farther apart than sea areas are wide, in any order of the two."""
+    return np.asarray(np.hypot(*((second - first + 180) % 360 - 180).T) > FAR_DEG)
 
 
 def continuous_line(points: Array, near_lon_deg: float) -> Array:

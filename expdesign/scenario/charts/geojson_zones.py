@@ -19,6 +19,8 @@ from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario.charts.geojson import UNNAMED, Chart, Feature, positions_in, read_features, read_layers
 from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used, taken_for
 from expdesign.scenario.charts.zones import (
+    KM_PER_DEGREE,
+    LARGEST_EXTENT_KM,
     AreaTable,
     Box,
     ChartedObject,
@@ -58,7 +60,10 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
         unused = [area for area, before in zip(areas, charted, strict=True) if not kind_of(before, table)]
         chart = _read_chart(table, features, areas, depths, given, entry)
         objects = dangers(features, table, (chart.extent[0] + chart.extent[2]) / 2)
-    used = {*table.land_layers, *table.water_layers, *depths, UNNAMED}
+        used = {*table.land_layers, *table.water_layers, *depths, UNNAMED}
+        counted = [item for item in features if item.layer in used or kind_of(item, table)]
+        if given is None:
+            _check_order(counted, _middle(counted), "most of the chart")
     signs = _sign_of_depths(depths, objects, path, table, entry)
     rules = ShipRules(
         needed_m=rule_text(file.depth, draught_m)[0],
@@ -68,7 +73,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
 
     def zones(box: Box, frame: LocalFrame) -> ChartZones:
         with _or_skipped(path, table, entry):
-            _check_order([item for item in features if item.layer in used or kind_of(item, table)], box)
+            _check_order(counted, box, "the bounds")
         deep, rule = _deep_water(file, depths, draught_m, entry)
         solid, closed, rules_notes = closed_water(objects, rules, around(box), frame)
         return ChartZones(
@@ -114,15 +119,23 @@ def _or_skipped(path: Path, table: ChartTable, entry: Entry) -> Iterator[None]:
         raise FileError(path, error.key, f"{error.problem}; {way_out}") from None
 
 
-def _check_order(features: Sequence[Feature], box: Box) -> None:
-    """Refuse a feature far outside the bounds that lies in them with longitude and latitude swapped."""
+def _middle(features: Sequence[Feature]) -> Box:
+    """A box around where most corners are, as large as a sea area may be."""
+    lon, lat = np.median([corner for feature in features for corner in positions_in(feature.geometry)], axis=0)
+    half = LARGEST_EXTENT_KM / KM_PER_DEGREE / 2
+    wide = half / max(float(np.cos(np.radians(lat))), 0.05)
+    return lon - wide, lat - half, lon + wide, lat + half
+
+
+def _check_order(features: Sequence[Feature], box: Box, name: str) -> None:
+    """Refuse a feature far outside a box that lies in it with longitude and latitude swapped."""
     first = beside(np.array([next(positions_in(feature.geometry)) for feature in features]), box)
     for index in np.flatnonzero(far_outside(first, box)).tolist():
         feature = features[index]
         if swapped_meets(np.array(list(positions_in(feature.geometry))), box):
             raise feature.entry.error(
-                f"lies {off_km(shapely.Point(first[index]), box):.4g} km outside the bounds, expected [longitude, "
-                "latitude]: with the two swapped it lies in them"
+                f"lies {off_km(shapely.Point(first[index]), box):.4g} km outside {name}, expected [longitude, "
+                "latitude]: with the two swapped it lies in there"
             )
 
 
