@@ -25,6 +25,7 @@ class Found:
     nuisance_values: np.ndarray
     joint_covariance: np.ndarray
     warnings: tuple[str, ...] = ()
+    between_runs: np.ndarray | float = 0.0
 
 
 def found(seed: int) -> Found:
@@ -124,3 +125,25 @@ def test_a_range_falls_away_where_the_estimate_alone_contradicts_it() -> None:
 def test_euler_s_parameters_have_no_such_prior() -> None:
     with pytest.raises(InputError, match="continuous motion"):
         EstimateOptions(prior="parameter_std", motion="euler")
+
+
+def test_what_runs_differ_by_widens_the_joined_estimate_and_leaves_its_values() -> None:
+    """With D that share of the data's covariance the joined one is larger by A D A', where A carries data to it."""
+    before, model = found(3), known([0.5, 2.0])
+    differ = np.outer([0.4, -0.3, 0.2], [0.4, -0.3, 0.2])
+    wide = replace(
+        before, between_runs=differ, joint_covariance=before.joint_covariance + differ,
+        covariance=before.covariance + differ[:2, :2],
+    )  # fmt: skip
+    own, wider = with_prior(before, model), with_prior(wide, model)
+    np.testing.assert_allclose(wider.values, own.values, rtol=1e-9)
+    moved = [
+        with_prior(
+            replace(before, values=before.values + step[:2], nuisance_values=before.nuisance_values + step[2:]), model
+        )
+        for step in np.eye(3)
+    ]
+    A = np.array(
+        [np.concatenate([one.values - own.values, one.nuisance_values - own.nuisance_values]) for one in moved]
+    ).T
+    np.testing.assert_allclose(wider.joint_covariance - own.joint_covariance, A @ differ @ A.T, atol=1e-9)

@@ -14,11 +14,8 @@ from expdesign.diagnosis.causes.candidate import Candidate
 from expdesign.diagnosis.data.noise import Noise
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.between_runs import (
-    Dispersion,
-    Spread,
     counting_runs,
     directions_between_runs,
-    few_runs_factor,
     tail,
 )
 from expdesign.diagnosis.fit.fit import Fit
@@ -31,6 +28,7 @@ from expdesign.diagnosis.select.selection import Selection, Step, _equivalent
 from expdesign.diagnosis.select.selection_round import _alternatives, open_candidates
 from expdesign.diagnosis.select.shortlist import _shortlist
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.estimation.solve import Dispersion, Spread, few_runs_factor
 from expdesign.signals import Record
 from hidden_effects import Weather
 

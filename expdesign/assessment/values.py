@@ -117,6 +117,9 @@ class Assessment:
 # the parameters, and the prior theta_0 with P. Values outside the ranges that the file states move to the most probable
 # ones theta' within, and all others by x + C_: C^-1 (theta' - theta).
 #
+# What runs differ by does not act on the gain: a prior by regressions lacks the same terms, and is as sure of its form.
+# It adds to the covariance of what is joined, as far as that follows the data.
+#
 # Source: A. Gelb (ed.), Applied Optimal Estimation (1974), 4.2.
 
 NONE, PARAMETER_STD = "none", "parameter_std"
@@ -146,8 +149,11 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
     places, count = [model.names.index(name) for name in found.names], len(found.names)
     prior = model.parameter_covariance[np.ix_(places, places)]
     apart = model.parameters[places] - found.values
-    gain = np.linalg.solve(found.covariance + prior, found.joint_covariance[:count]).T
-    joint = found.joint_covariance - gain @ found.joint_covariance[:count]
+    noise = found.joint_covariance - found.between_runs
+    gain = np.linalg.solve(noise[:count, :count] + prior, noise[:count]).T
+    kept = np.eye(len(noise))
+    kept[:, :count] -= gain  # what of an error of the data stays
+    joint = noise - gain @ noise[:count] + kept @ (found.joint_covariance - noise) @ kept.T
     joint = (joint + joint.T) / 2
     distance = float(apart @ np.linalg.solve(found.covariance + prior, apart))
     chance = float(scipy.special.chdtrc(count, distance))

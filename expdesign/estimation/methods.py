@@ -255,6 +255,7 @@ def _estimate(
         nuisance_shares=tuple(item.shares for item in layout.nuisance),
         partners=dict(layout.partners),
         joint_covariance=solution.covariance,
+        between_runs=solution.between_runs,
         residuals=residuals,
         null_space=solution.null_space,
         refinements=refined.refinements,

@@ -206,6 +206,7 @@ class Estimate:
     steered: Steered  # samples marked as steered, and what became of them
     # the test whether inputs that instruments are simulated from follow disturbances; None without one
     feedback: Feedback | None
+    between_runs: Array | float = 0.0  # (p + q, p + q) what of `joint_covariance` is by how runs differ; 0 for nothing
 
     def __post_init__(self) -> None:
         seal(self, values="p", covariance="p p", nuisance_values="q", joint_covariance="r r")

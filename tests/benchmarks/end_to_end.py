@@ -228,7 +228,8 @@ def outcome(
         with suppress(InputError):  # hardly any ship that the estimate draws brakes, or steers to the right side
             errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
             error, joined = float(np.median(np.abs(errors))), prior
-            break
+            if math.isfinite(error):  # else the estimated vessel herself does not
+                break
     said = "not asked for"
     if diagnosed:
         status = expdesign(["diagnose", *common, "--out", str(folder / "diagnosis")])

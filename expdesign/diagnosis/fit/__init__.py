@@ -6,15 +6,11 @@ compares two, `counting_runs` corrects standard errors, `cross_validate` measure
 
 from expdesign.diagnosis.fit.between_runs import (
     NOISE_ALONE,
-    Dispersion,
-    Spread,
     counting_runs,
     counting_stretches,
     directions_between_runs,
-    few_runs_factor,
     of_several,
     runs_of,
-    spread_between_runs,
     tail,
 )
 from expdesign.diagnosis.fit.cross_validation import (
@@ -63,3 +59,7 @@ from expdesign.diagnosis.fit.linear_model import (
     window_information,
 )
 from expdesign.diagnosis.fit.output_error import AHEAD_S, fit_ahead, fit_output_error, no_smaller, with_longer_windows
+from expdesign.estimation.solve import Dispersion as Dispersion
+from expdesign.estimation.solve import Spread as Spread
+from expdesign.estimation.solve import few_runs_factor as few_runs_factor
+from expdesign.estimation.solve import spread_between_runs as spread_between_runs

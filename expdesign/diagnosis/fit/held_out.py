@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.between_runs import NORMAL_95, sum_by_run
+from expdesign.diagnosis.fit.between_runs import sum_by_run
 from expdesign.diagnosis.fit.linear_model import (
     GramMatrices,
     Sensitivities,
@@ -41,6 +41,7 @@ from expdesign.diagnosis.fit.linear_model import (
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import linearise, simulate_from_measured
+from expdesign.estimation.solve import NORMAL_95
 from expdesign.values import Array
 
 BLOCK_S = 60.0  # length of the blocks that predictions are compared in [s]

@@ -30,7 +30,16 @@ from expdesign.estimation.noise import SPECTRUM_MISFIT, Fitted, Stretch, coupled
 from expdesign.estimation.output_error.gauss_newton import regular, runs_away
 from expdesign.estimation.output_error.problem import Problem
 from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, Regression, headings_at
-from expdesign.estimation.solve import Solution, Weighting, changing_variance, misfit_note, solve_ls, widening
+from expdesign.estimation.solve import (
+    Shares,
+    Solution,
+    Weighting,
+    changing_variance,
+    differing_note,
+    misfit_note,
+    solve_ls,
+    widening,
+)
 from expdesign.signals import Record
 from expdesign.values import Array
 
@@ -65,7 +74,8 @@ def with_covariance(
     weighting = Weighting(output_weights=tuple(problem.weights / problem.weights.max()), covariance="hc0")
     whole = _with_known(regression, problem, values)
     last = solve_ls(whole, weighting)
-    P, misfit = (last.covariance, np.zeros(n)) if quick else _propagated(problem, layout, record, simulated)
+    found = None if quick else _propagated(problem, layout, record, simulated)
+    P, misfit = (last.covariance, np.zeros(n)) if found is None else (found.P, found.misfit)
     if (misfit > SPECTRUM_MISFIT).any():
         robust = solve_ls(whole, replace(weighting, covariance="hac"))
         own, other = np.diag(P), np.diag(robust.covariance)
@@ -73,6 +83,11 @@ def with_covariance(
         P = P * np.outer(scale, scale)
         note = misfit_note(regression.outputs, misfit)
         last = replace(last, lags=robust.lags, warnings=(*last.warnings, note))
+    if found is not None:
+        wider, ratio = found.shares.widened(P)
+        if ratio > 1.0:
+            last = replace(last, warnings=(*last.warnings, differing_note(ratio)), between_runs=wider - P)
+        P = wider
     heavier = np.where(seen, heavier, 1.0).reshape(-1, n)[order]
     residuals = last.residuals[: len(regression)] / heavier
     last = replace(last, values=values[: len(names)] + last.values, residuals=residuals)
@@ -138,14 +153,27 @@ def _between_readings(problem: Problem, states: Array) -> Array:
     return errors
 
 
-def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Linearised) -> tuple[Array, Array]:
-    """(p, p) covariance by the noise of one step, and (n,) how little that explains each output's."""
+@dataclass(frozen=True, eq=False)
+class _Propagated:
+    """What the noise of one step does to an estimate."""
+
+    P: Array  # (p, p) covariance
+    misfit: Array  # (n,) how little that noise explains each output's
+    shares: Shares  # of the runs
+
+
+def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Linearised) -> _Propagated:
     A, slopes = simulated.steps, _columns(simulated.slopes, problem, layout)[0]
     lead = slopes * problem.weight[..., None]
     sensed = np.einsum("lwna,lwnb->nab", lead, lead, optimize=True)
     known = np.zeros((2, slopes.shape[-1]))
     known[:, : problem.parameters] = problem.precision, problem.precision * problem.spread
     G = _inverse(np.einsum("lwna,lwnb->ab", lead, slopes, optimize=True) + np.diag(known[0]))
+    runs = np.unique(problem.batch)
+    of = [G.T @ np.einsum("lwna,lwnb->ab", lead[:, own], slopes[:, own], optimize=True)
+          for own in (problem.batch == run for run in runs)]  # fmt: skip
+    scores = [np.einsum("lwna,lwn->a", lead[:, own], simulated.errors[:, own]) @ G
+              for own in (problem.batch == run for run in runs)]  # fmt: skip
     for sample in range(len(lead) - 2, -1, -1):  # summed backwards to lambda, in place
         lead[sample] += A[sample].swapaxes(1, 2) @ lead[sample + 1]
     rows, errors, owner = _steps_of(problem, record), simulated.errors, _owners(problem, layout)
@@ -162,7 +190,8 @@ def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Li
     changing = changing_variance(W, eps, rows.batch, rows.step)
     scale = changing * widening(np.diag(P), doubt)
     beforehand = G * known[1]
-    return P * np.outer(scale, scale) + beforehand @ beforehand.T, found.misfit
+    P = P * np.outer(scale, scale) + beforehand @ beforehand.T
+    return _Propagated(P, found.misfit, Shares(np.array(scores), np.array(of)))
 
 
 def _inverse(information: Array) -> Array:

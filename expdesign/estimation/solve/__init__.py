@@ -1,5 +1,15 @@
 """Instrumental-variable equations solved, with covariance and null space."""
 
+from expdesign.estimation.solve.between_runs import (
+    MOST_FREEDOM,
+    NORMAL_95,
+    Dispersion,
+    Shares,
+    Spread,
+    differing_note,
+    few_runs_factor,
+    spread_between_runs,
+)
 from expdesign.estimation.solve.null_space import Direction, NullSpace
 from expdesign.estimation.solve.sandwich import changing_variance, misfit_note, widening
 from expdesign.estimation.solve.solution import (

@@ -60,6 +60,7 @@ class Uncertainty:
     covariance: Array  # (p, p)
     lags: int  # last lag that a kernel counts
     warnings: tuple[str, ...] = ()  # one sentence each
+    between_runs: Array | float = 0.0  # (p, p) what of the covariance is by how runs differ; 0 where they do not
 
 
 def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:

@@ -9,8 +9,9 @@ import numpy as np
 
 from expdesign.errors import Diverged, InputError, NotInformative, ShapeError
 from expdesign.estimation.regression import Regression
+from expdesign.estimation.solve.between_runs import Shares, differing_note
 from expdesign.estimation.solve.null_space import NullSpace, joined, require_informative
-from expdesign.estimation.solve.sandwich import covariance_of
+from expdesign.estimation.solve.sandwich import Uncertainty, covariance_of
 from expdesign.estimation.solve.systems import Part, System, build_part, occupied, split
 from expdesign.estimation.solve.systems import Weighting as Weighting
 from expdesign.values import Array, seal
@@ -45,6 +46,7 @@ class Solution:
     lags: int  # last lag that a kernel of the covariance counts, 0 where there is none
     null_space: NullSpace = field(repr=False)  # what the data cannot see
     warnings: tuple[str, ...] = ()  # one sentence each
+    between_runs: Array | float = 0.0  # (p, p) what of the covariance is by how runs differ; 0 where they do not
 
     def __post_init__(self) -> None:
         seal(self, values="p", covariance="p p", residuals="k n")
@@ -112,6 +114,8 @@ def solved(equations: Equations, parts: Sequence[Part]) -> Solution:
         residuals[np.ix_(rows, part.system.outputs)] = left
     found = joined([part.found for part in parts])
     said = covariance_of(regression, weighting, parts, residuals)
+    if weighting.covariance == "components":
+        said = _counting_runs(said, regression, parts, residuals)
     return Solution(
         values=values,
         covariance=said.covariance,
@@ -119,7 +123,25 @@ def solved(equations: Equations, parts: Sequence[Part]) -> Solution:
         lags=said.lags,
         null_space=found,
         warnings=said.warnings,
+        between_runs=said.between_runs,
     )
+
+
+def _counting_runs(said: Uncertainty, regression: Regression, parts: Sequence[Part], residuals: Array) -> Uncertainty:
+    """The uncertainty with what runs differ by."""
+    batches, p = np.unique(regression.batch_of), len(regression.parameters)
+    scores, of = np.zeros((len(batches), p)), np.zeros((len(batches), p, p))
+    for part in parts:
+        system, batch = part.system, regression.batch_of[part.system.rows]
+        own = Shares.by_batch(batch, part.W, system.varying, residuals[system.rows][:, system.outputs])
+        there = np.searchsorted(batches, np.unique(batch))
+        scores[np.ix_(there, system.columns)] = own.scores
+        of[np.ix_(there, system.columns, system.columns)] = own.of
+    P, ratio = Shares(scores, of).widened(said.covariance)
+    if ratio == 1.0:
+        return said
+    notes = (*said.warnings, differing_note(ratio))
+    return replace(said, covariance=P, warnings=notes, between_runs=P - said.covariance)
 
 
 def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]:
