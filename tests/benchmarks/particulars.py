@@ -6,11 +6,13 @@ naval vessel and the car carrier, which were added later. Of these the naval ves
 not published (two, and what holds the speed), nor the car carrier's rudder area (the least that DNV asks for).
 
     python tests/benchmarks/record.py particulars
+    python tests/benchmarks/particulars.py speeds    # the last table alone, in 20 s
 """
 
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -37,6 +39,8 @@ MODELS: dict[str, Callable[[], published.Model]] = {
 }
 MEASURED = ("kvlcc2-model", "albatross", "macginitie")
 HARD = math.radians(35.0)
+SHARES = (1.0, 0.7, 0.5, 0.3)
+DIAMETER = "tactical_diameter_m"
 
 
 @dataclass(frozen=True)
@@ -133,21 +137,38 @@ def summary(rows: list) -> tuple[int, int, float]:
     return len(rows), inside, 100 * float(np.median(sizes)) if sizes else math.nan
 
 
-def speed_scaling() -> list[tuple[str, float, float, float]]:
-    """Ship, share of speed, tactical diameter by length of her MMG model and of the vessel fitted at full speed."""
+def speed_scaling() -> list[tuple[str, float, tuple[float, float], float, float]]:
+    """Ship, share of speed, tactical diameters by length: of her MMG model to both sides, and of two vessels.
+
+    One vessel is of particulars alone, the other fitted to one circle at full speed, the mean of both sides.
+    """
     rows = []
-    for name in ("kvlcc2", "seiun-maru"):
+    for name in ("kvlcc2", "seiun-maru", "kcs"):
         one, model = case(name), MODELS[name]()
-        shares = (1.0, 0.8, 0.6, 0.45, 0.3)
-        also = tuple(Trial(kind="circle", speed_mps=share * model.speed_mps, angle_rad=HARD) for share in shares)
-        found = nominal(replace(one.card, stated=known_of(one)), also=also)
-        for share, trial in zip(shares, also, strict=True):
-            truth = [
-                published.circle(model, speed=trial.speed_mps, helm_deg=h)["tactical_diameter_m"] for h in (35, -35)
-            ]
-            mine = next(p.value for p in found.predicted if p.trial == trial and p.quantity == "tactical_diameter_m")
-            rows.append((name, share, math.sqrt(truth[0] * truth[1]) / model.length_m, mine / model.length_m))
+        also = tuple(Trial(kind="circle", speed_mps=share * model.speed_mps, angle_rad=HARD) for share in SHARES)
+        cards = one.card, replace(one.card, stated=known_of(one))
+        alone, fitted = (
+            {p.trial: p.value / model.length_m for p in nominal(card, also=also).predicted if p.quantity == DIAMETER}
+            for card in cards
+        )
+        for share, trial in zip(SHARES, also, strict=True):
+            starboard, port = (
+                published.circle(model, speed=trial.speed_mps, helm_deg=helm)[DIAMETER] / model.length_m
+                for helm in (35.0, -35.0)
+            )
+            rows.append((name, share, (starboard, port), alone[trial], fitted[trial]))
     return rows
+
+
+def show_speed_scaling() -> None:
+    """The table; an entry's two deviations are those from starboard and port turns of the MMG model."""
+    print("\nTactical diameter by length at shares of full speed, of her MMG model to starboard and port, of the")
+    print("vessel of particulars alone, and of the vessel fitted to one circle at full speed:")
+    head("ship", "share of full speed", "MMG", "particulars alone", "apart", "one circle known", "apart")
+    for name, share, sides, alone, fitted in speed_scaling():
+        apart = [", ".join(f"{mine / side - 1:+.0%}" for side in sides) for mine in (alone, fitted)]
+        truth = ", ".join(f"{side:.2f}" for side in sides)
+        print(f"| {name} | {share:.0%} | {truth} | {alone:.2f} | {apart[0]} | {fitted:.2f} | {apart[1]} |")
 
 
 HEADS = (
@@ -178,10 +199,7 @@ def main() -> None:
         rows = [row for row in every if row[0].quantity == quantity]
         bias = float(np.median([error for _, error, _ in rows]))
         print(f"| {quantity} | {cells(rows)} | {100 * math.expm1(bias):+.0f} % |")
-    print("\nTactical diameter by length, of her MMG model and of the vessel fitted to one circle at full speed:")
-    head("ship", "share of full speed", "MMG", "vessel", "apart")
-    for name, part, truth, mine in speed_scaling():
-        print(f"| {name} | {part:.0%} | {truth:.2f} | {mine:.2f} | {mine / truth - 1:+.0%} |")
+    show_speed_scaling()
     print(f"\n{time.time() - began:.0f} s.")
 
 
@@ -191,4 +209,4 @@ def cells(rows: list) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    show_speed_scaling() if sys.argv[1:] == ["speeds"] else main()
