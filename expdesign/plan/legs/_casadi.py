@@ -99,8 +99,10 @@ class Program:
         options |= {"ipopt.max_iter": ITERATIONS, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
         options |= {"ipopt.mumps_pivot_order": 0}  # minimum degree: by far the least work for chains of samples
-        # all is scaled here: what MUMPS would scale, and what a second solution would refine, changes no digit kept
-        options |= {f"ipopt.mumps_{name}scaling": 0 for name in ("", "permuting_")} | {"ipopt.min_refinement_steps": 0}
+        # variables are scaled here, but multipliers and regularisation may grow to 1e12: without scaling by MUMPS, pivots
+        # that it puts off fill its factors, and one iteration took a second instead of ten milliseconds
+        options |= {"ipopt.mumps_scaling": 77, "ipopt.mumps_permuting_scaling": 0}
+        options |= {"ipopt.min_refinement_steps": 0}  # refining all solutions changes no digit kept
         if not by_force(self.vessel.model):  # terms with corners, as |n|: there IPOPT goes to and fro
             options |= {"ipopt.acceptable_iter": CORNERED, "ipopt.acceptable_tol": 1e8}
             options |= {"ipopt.acceptable_constr_viol_tol": 1e-3 if self.free else 1e-7}
