@@ -99,8 +99,8 @@ class Program:
         options |= {"ipopt.max_iter": ITERATIONS, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
         options |= {"ipopt.mumps_pivot_order": 0}  # minimum degree: by far the least work for chains of samples
-        # variables are scaled here, but multipliers and regularisation may grow to 1e12: without scaling by MUMPS, pivots
-        # that it puts off fill its factors, and one iteration took a second instead of ten milliseconds
+        # variables are scaled here, but multipliers and regularisation may grow to 1e12: without scaling by MUMPS,
+        # pivots that it puts off fill its factors, and one iteration took a second instead of ten milliseconds
         options |= {"ipopt.mumps_scaling": 77, "ipopt.mumps_permuting_scaling": 0}
         options |= {"ipopt.min_refinement_steps": 0}  # refining all solutions changes no digit kept
         if not by_force(self.vessel.model):  # terms with corners, as |n|: there IPOPT goes to and fro
