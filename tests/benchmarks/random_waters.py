@@ -128,7 +128,8 @@ def outcome(case: int, folder: Path) -> tuple[str, str]:
     spent_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     (folder / "log.txt").write_text(done.stdout + done.stderr, "utf-8")
     plan = folder / "out/plan.json"
-    aborted = f"{json.loads(plan.read_text('utf-8')).get('aborted_share', 0.0):6.1%} aborted" if plan.exists() else ""
+    drawn_trials = json.loads(plan.read_text("utf-8"))["drawn_trials"] if plan.exists() else None
+    aborted = f"{drawn_trials['aborted_share']:6.1%} aborted" if drawn_trials else ""
     word = {0: "verified", 3: "not verified" if plan.exists() else "refused"}.get(done.returncode, "failed")
     why = "" if done.returncode == 0 else done.stderr.strip().splitlines()[-1][:160]
     return word, f"{spent_s:5.0f} s  {aborted}  {why}"
