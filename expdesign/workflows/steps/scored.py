@@ -73,6 +73,7 @@ def speed_remarks(vessel: Vessel, runs: Iterable[Trajectory], what: str) -> tupl
     slack = SPEED_SLACK * max(abs(low), abs(high))
     if least >= low - slack and most <= high + slack:
         return ()
+    least, most = (round(speed, 3) + 0.0 for speed in (least, most))  # a ship at rest goes at 0, not at -4.7e-15
     return (
         f"a {what} goes from {least:.3g} to {most:.3g} m/s, but the data that determined the model from {low:.3g} to "
         f"{high:.3g} m/s (model.speeds_mps): what lies beyond is extrapolated",
