@@ -21,7 +21,7 @@ from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, to_take_out
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection import Step, least_significant_step, wald_p_value, without_step
+from expdesign.diagnosis.select.selection import Step, insignificant_steps, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import (
     Work,
     selection_round,
@@ -179,11 +179,11 @@ def test_a_cause_of_size_zero_is_taken_out_and_the_rest_is_estimated_anew(barge)
         for candidate in order:
             steps.append(added(base, windows, candidate))
             base = steps[-1].chosen.fit
-        assert least_significant_step(with_p_values(steps, base)) == insignificant
+        assert insignificant_steps(with_p_values(steps, base)) == [insignificant]
         (rest,) = without_step(steps, insignificant, windows) or ()
         assert rest.before is before
         assert rest.chosen.fit.value("gain") == pytest.approx(alone.chosen.fit.value("gain"), abs=1e-3)
-        assert least_significant_step(with_p_values([rest], rest.chosen.fit)) is None
+        assert insignificant_steps(with_p_values([rest], rest.chosen.fit)) == []
 
 
 def test_runs_held_out_do_not_influence_the_estimates_they_validate(barge):

@@ -19,6 +19,7 @@ from expdesign.diagnosis.fit.between_runs import (
     tail,
 )
 from expdesign.diagnosis.fit.fit import Fit
+from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.fit.linear_model import Sensitivities, gram_matrices, marginalised
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select import backward_elimination
@@ -30,6 +31,7 @@ from expdesign.diagnosis.select.shortlist import _shortlist
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.estimation.solve import Dispersion, Spread, few_runs_factor
 from expdesign.signals import Record
+from held_out_cases import errors
 from hidden_effects import Weather
 
 RUNS, SAMPLES, APART, NOISE = 14, 60, 0.3, 1.0
@@ -237,25 +239,84 @@ def test_held_out_parts_tell_of_two_runs_what_one_degree_of_freedom_cannot(monke
     assert after.p_value == pytest.approx(1e-3 if told else 0.11, rel=0.01)
 
 
-def test_what_gains_nothing_beside_a_cause_of_which_nothing_is_left_is_asked_again(monkeypatch):
-    """A change of the ship takes the gain of a rudder's scale, and how runs differ leaves nothing of the change."""
+def a_step(cause: str, p_value: float) -> Step:
+    chosen = SimpleNamespace(candidate=Candidate(cause=cause, free={cause: 0.0}), fit=cause, is_block=cause == "block")
+    return Step(chosen=chosen, p_value=p_value, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
 
-    def step(cause: str, p_value: float) -> Step:
-        chosen = SimpleNamespace(candidate=Candidate(cause=cause, free={cause: 0.0}), fit=cause)
-        return Step(chosen=chosen, p_value=p_value, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
 
-    def improves(found: Selection, *_: object) -> list[bool]:
-        return [index == 0 for index, _ in enumerate(found.steps)]
-
-    steps = step("change_point", 1.0), step("actuator_scale", 1e-9), step("lever_arm", 0.5)
-    found = Selection(steps=steps, first=None, last=None, last_tests=())  # type: ignore[arg-type]
+def causes_left(monkeypatch, steps: tuple[Step, ...], runs: int, improves, held) -> list[str]:
+    """Causes after the elimination of those found in so many runs, by stubs of what improves and of errors."""
     for name, instead in {
         "improves_held_out": improves,
         "open_candidates": lambda *_: [],
         "with_runs_counted": lambda selection, *_: selection,
+        "two_runs_by_predictions": lambda selection, *_: selection,
         "without_step": lambda given, index, _windows: [*given[:index], *given[index + 1 :]],
     }.items():
         monkeypatch.setattr(backward_elimination, name, instead)
-    windows = SimpleNamespace(batch=np.arange(3.0))
-    kept, _ = backward_elimination.eliminate_backward(found, windows, lambda one: (one, []), 0)  # type: ignore[arg-type]
-    assert [one.chosen.candidate.cause for one in kept.steps] == ["actuator_scale"]
+    found = Selection(steps=steps, first=None, last=None, last_tests=())  # type: ignore[arg-type]
+    windows = SimpleNamespace(batch=np.arange(float(runs)))
+    kept, _ = backward_elimination.eliminate_backward(found, windows, lambda one: (one, held(one)), 0)  # type: ignore[arg-type]
+    return [one.chosen.candidate.cause for one in kept.steps]
+
+
+def test_what_gains_nothing_beside_a_cause_of_which_nothing_is_left_is_asked_again(monkeypatch):
+    """A change of the ship takes the gain of a rudder's scale, and how runs differ leaves nothing of the change."""
+
+    def improves(found: Selection, *_: object) -> list[bool]:
+        return [index == 0 for index, _ in enumerate(found.steps)]
+
+    steps = a_step("change_point", 1.0), a_step("actuator_scale", 1e-9), a_step("lever_arm", 0.5)
+    assert causes_left(monkeypatch, steps, 3, improves, lambda _: []) == ["actuator_scale"]
+
+
+def all_improve(found: Selection, *_: object) -> list[bool]:
+    return [True] * len(found.steps)
+
+
+def is_in(found: Selection, cause: str) -> bool:
+    return any(one.chosen.candidate.cause == cause for one in found.steps)
+
+
+@pytest.mark.parametrize(
+    ("runs", "cause", "without", "left"),
+    [
+        (2, "current", 40.0, ["current", "delay"]),  # 40 points are lost without it
+        (2, "current", 79.9, ["delay"]),  # too little for a word
+        (2, "current", 40.0 + 40.0 * np.array([[-2.0], [0.0], [1.2]] * 2), ["delay"]),  # much, but not for certain
+        (3, "current", 40.0, ["delay"]),  # more degrees of freedom
+        (2, "change_point", 40.0, ["delay"]),
+        (2, "block", 40.0, ["delay"]),
+    ],
+)  # fmt: skip
+def test_of_two_runs_a_cause_stays_that_simulations_need_beside_the_others(monkeypatch, runs, cause, without, left):
+    """The least significant one; the next is not needed and goes instead."""
+
+    def held(found: Selection) -> list[HeldOut]:
+        return [errors(0.0), *[errors(80.0 if is_in(found, cause) else without)] * len(found.steps)]
+
+    steps = a_step(cause, 0.11), a_step("lever_arm", 0.07), a_step("delay", 1e-9)
+    assert causes_left(monkeypatch, steps, runs, all_improve, held) == left
+
+
+@pytest.mark.parametrize("with_it", [False, True])
+def test_errors_with_and_without_a_cause_are_measured_alike(monkeypatch, with_it):
+    """Those of one are of whole runs, which tell the opposite, those of the other of stretches."""
+
+    def held(found: Selection) -> list[HeldOut]:
+        there = is_in(found, "current")
+        ahead = errors(80.0 if there else 40.0)
+        if there == with_it:
+            ahead = replace(ahead, in_stretches=True)
+        else:
+            ahead = replace(errors(10.0 if there else 95.0), ahead=lambda one=ahead: one)
+        return [errors(0.0), *[ahead] * len(found.steps)]
+
+    steps = a_step("current", 0.11), a_step("delay", 1e-9)
+    assert causes_left(monkeypatch, steps, 2, all_improve, held) == ["current", "delay"]
+
+
+def test_of_two_runs_the_only_cause_has_to_be_significant(monkeypatch):
+    steps = (a_step("current", 0.11),)
+    held = [errors(0.0), errors(80.0)]
+    assert causes_left(monkeypatch, steps, 2, all_improve, lambda found: held[: 1 + len(found.steps)]) == []

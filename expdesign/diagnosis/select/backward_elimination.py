@@ -23,7 +23,7 @@ from expdesign.diagnosis.fit import (
 from expdesign.diagnosis.select.selection import (
     Selection,
     Step,
-    least_significant_step,
+    insignificant_steps,
     with_runs_counted,
     without_step,
 )
@@ -40,7 +40,8 @@ def eliminate_backward(
 ) -> tuple[Selection, list[HeldOut]]:
     """Drop causes without held-out gain, and causes whose size is indistinguishable from zero.
 
-    What gains nothing beside a cause of which nothing is left is asked again without it.
+    What gains nothing beside a cause of which nothing is left is asked again without it. In two runs a cause stays
+    whatever its p-value where simulations of held-out data need it beside the others.
 
     Args:
         cross_validated: the selection, its causes fitted as they are judged, and errors on held-out units of the model
@@ -62,11 +63,39 @@ def eliminate_backward(
         whole, found = found, before_first_without_gain(found, improves)
         counted = with_runs_counted(found, open_candidates(found.last, windows), np.random.default_rng(seed))
         counted = two_runs_by_predictions(counted, held, windows)
-        index = least_significant_step(counted.steps)
-        others = None if index is None else without_step(list(whole.steps), index, windows)
-        if others is None:
+        for index in insignificant_steps(counted.steps):
+            others = without_step(list(whole.steps), index, windows)
+            if others is None:
+                return counted, held
+            found = whole.with_steps(tuple(others))
+            if not (
+                _may_be_needed(index, counted, windows) and _is_needed(counted, held, cross_validated(found)[1], seed)
+            ):
+                break
+        else:
             return counted, held
-        found = whole.with_steps(tuple(others))
+
+
+def _may_be_needed(index: int, found: Selection, windows: Windows) -> bool:
+    """Whether simulations may tell against a p-value: of a cause of two runs, which have one degree of freedom."""
+    return len(found.steps) > 1 and _are_two_runs(windows) and _may_show_in_predictions(found.steps[index])
+
+
+def _is_needed(found: Selection, held: Sequence[HeldOut], without: Sequence[HeldOut], seed: int) -> bool:
+    """Whether simulations of held-out data need a cause beside the others, for certain.
+
+    Args:
+        found: the causes with gain.
+        held: errors on held-out units of the model before any cause, then after every step.
+        without: the same without the cause, the others fitted again.
+        seed: of the gains' intervals.
+    """
+    before, after = without[len(found.steps) - 1], held[len(found.steps)]
+    return shows_for_certain(before.like(after), after.like(before), seed)
+
+
+def _are_two_runs(windows: Windows) -> bool:
+    return len(np.unique(windows.batch)) == FEWEST_RUNS - 1
 
 
 def two_runs_by_predictions(found: Selection, held: Sequence[HeldOut], windows: Windows) -> Selection:
@@ -75,7 +104,7 @@ def two_runs_by_predictions(found: Selection, held: Sequence[HeldOut], windows: 
     Of how runs differ two tell with one degree of freedom, which makes nothing significant. Held-out parts of them do:
     what is said is of these runs sailed on, as intervals of gains are.
     """
-    if len(np.unique(windows.batch)) != FEWEST_RUNS - 1:
+    if not _are_two_runs(windows):
         return found
 
     def told(index: int, step: Step) -> Step:

@@ -169,11 +169,10 @@ def p_value_between_runs(chosen: FittedCandidate, last: Fit | None, known: Dispe
     return of_several(ratio if last is None else max(ratio, wald_p_value(chosen, last)), chosen.multiplicity)
 
 
-def least_significant_step(steps: tuple[Step, ...]) -> int | None:
-    """The step with the largest p-value, if that is not significant."""
-    p_values = [step.p_value for step in steps]
-    worst = int(np.argmax(p_values)) if p_values else 0
-    return worst if p_values and p_values[worst] > TUNING.level else None
+def insignificant_steps(steps: Sequence[Step]) -> list[int]:
+    """The steps whose p-values are not significant, the largest first."""
+    worst_first = sorted(range(len(steps)), key=lambda index: -steps[index].p_value)
+    return [index for index in worst_first if steps[index].p_value > TUNING.level]
 
 
 def wald_p_value(chosen: FittedCandidate, last: Fit) -> float:
