@@ -12,7 +12,7 @@ import pytest
 from design_case import SCENARIOS, example_dictionary, random_matrices, vessel
 from expdesign.cli import main
 from expdesign.durations import best_subset
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NotInformative
 from expdesign.export.files.text import record_csv
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.records import load_records
@@ -187,3 +187,26 @@ def test_parameters_without_information_are_named(files, tmp_path, capsys):
     assert main(["mine", straight, "--vessel", str(SHIP), "--keep", "1", "--out", str(out)]) == 3
     assert "N_mu" in capsys.readouterr().err
     assert not out.exists()
+
+
+def noisy_batch(number: int, *, alike: bool, noise: float, rng: np.random.Generator) -> BatchInformation:
+    """Moments of white regressors and instruments (200, 2, 3); the last is three times the second where alike."""
+    instruments = rng.standard_normal((200, 2, 3)) + 0.3 * np.arange(3)
+    regressors = instruments + noise * rng.standard_normal(instruments.shape)
+    if alike:
+        instruments[..., 2], regressors[..., 2] = 3 * instruments[..., 1], 3 * regressors[..., 1]
+    X = np.einsum("kni,knj->ij", regressors, instruments) / 200
+    means = {"Y": regressors.mean(axis=0).T, "Z": instruments.mean(axis=0).T}
+    return BatchInformation(name=f"run{number}", seconds=200.0, samples=200, X=X, **means)
+
+
+@pytest.mark.parametrize("mean", ["none", "batch", "complete"])
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_parameters_that_no_batch_tells_apart_are_refused_and_named(mean: str, noise: float):
+    """Batches were ranked by the rounding of a determinant that is zero."""
+    rng = np.random.default_rng(5)
+    apart, alike = ([noisy_batch(k, alike=same, noise=noise, rng=rng) for k in range(5)] for same in (False, True))
+    assert len(best_subset(apart, ("a", "b", "c"), size=2, mean_subtraction=mean).chosen) == 2
+    with pytest.raises(NotInformative, match=r"combinations: (b and c|c and b)") as refused:
+        best_subset(alike, ("a", "b", "c"), size=2, mean_subtraction=mean)
+    assert sorted(refused.value.parameters) == ["b", "c"]

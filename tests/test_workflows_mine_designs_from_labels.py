@@ -21,7 +21,7 @@ from expdesign.rehearsal import drawn_subsets, random_subsets, recorded_pieces, 
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM
 from expdesign.vessel import Sensors
-from expdesign.workflows.commands.mine import labelled_pieces
+from expdesign.workflows.steps.labelled import labelled_pieces
 from labelled_trials import label_of, sailed, write_labelled
 from sample_files import outside
 

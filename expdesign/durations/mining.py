@@ -22,6 +22,7 @@ from expdesign.durations.problem import DurationProblem
 from expdesign.durations.rounding import ADDED_SHARE
 from expdesign.durations.solve import optimal_shares
 from expdesign.errors import InputError, NotInformative
+from expdesign.estimation.solve import null_space, require_informative
 from expdesign.information.recorded import BatchInformation
 from expdesign.values import Array, seal
 
@@ -139,6 +140,7 @@ def _pool(
         total_s=float(samples.sum()),
         mean_subtraction=mean_subtraction,
     )
+    _require_told_apart(problem, samples)
     definite = replace(problem, matrices=symmetric_part(problem.matrices))
     try:
         return definite, Collected.of(definite)
@@ -149,6 +151,19 @@ def _pool(
     if not np.isfinite(collected.value(samples / samples.sum())):
         raise NotInformative("all batches together do not inform about every parameter", parameters=tuple(parameters))
     return problem, collected
+
+
+def _require_told_apart(problem: DurationProblem, samples: Array) -> None:
+    """Refuse parameters that all batches together do not tell apart: their determinant is of rounding alone."""
+    p = len(problem.parameters)
+    total = np.tensordot(samples, problem.matrices, axes=1)
+    moment = total[:p, :p] - total[:p, p:] @ np.linalg.solve(total[p:, p:], total[p:, :p])
+    size = np.sqrt(np.abs(np.diag(total)[:p]))
+    size[size == 0] = 1.0
+    found = null_space(
+        moment / np.outer(size, size), problem.parameters, samples=int(samples.sum()), exogenous=problem.symmetric
+    )
+    require_informative(found)
 
 
 def _indicator(shares: Array, chosen: Sequence[int]) -> Array:

@@ -10,7 +10,7 @@ from expdesign.estimation.solve.between_runs import (
     few_runs_factor,
     spread_between_runs,
 )
-from expdesign.estimation.solve.null_space import Direction, NullSpace
+from expdesign.estimation.solve.null_space import Direction, NullSpace, null_space, require_informative
 from expdesign.estimation.solve.sandwich import changing_variance, misfit_note, widening
 from expdesign.estimation.solve.solution import (
     MOST_REFINEMENTS,
