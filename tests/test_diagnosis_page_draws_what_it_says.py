@@ -201,6 +201,18 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
     assert page.index("Missing acceleration") < page.index("<h2>1. ")
 
 
+@pytest.mark.parametrize(("p_value", "said"), [(0.024, False), (0.25, True)])
+def test_a_cause_with_a_large_p_value_is_said_to_stay_for_another_reason(clean, p_value: float, said: bool):
+    item = finding(("theta:X_u",), estimates=(Estimate(name="X_u", value=0.1, std=0.01, unit=""),))
+    found = replace(
+        clean, findings=(replace(item, p_value=p_value),), errors=(clean.windows.measured,),
+        step_residuals=(clean.residuals,),
+    )  # fmt: skip
+    page = document_html(diagnosis_document(found))
+    assert f">{p_value:.2g}" in page
+    assert ("it stays because simulations of held-out data are worse without it" in page) is said
+
+
 def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
     monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
     short = replace(

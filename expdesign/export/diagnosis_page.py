@@ -248,7 +248,8 @@ def _tested(found: Diagnosis) -> Section:
         "Other causes that were tested",
         f"p-values of all other causes{above}, corrected for the number of tests. 1 means no evidence. A cause becomes "
         f"a finding if its p-value after the fit is at most {SELECTION_TUNING.accepted_p_value:g} and adding it "
-        f"reduces an error of held-out {found.unit} by an interval that excludes zero.",
+        f"reduces an error of held-out {found.unit} by an interval that excludes zero. Of two runs, one beside others "
+        "also stays where simulations of held-out data are worse without it for certain.",
         Table(
             header=("Cause", "p-value"),
             rows=[(cause_title(cause), f"{p_value:.2g}") for cause, p_value in found.screened],
@@ -377,7 +378,9 @@ def _fit(value: float) -> str:
 
 
 def _p_value(p_value: float) -> str:
-    """Two digits; very small ones depend on the shape of the noise, so only a bound is given."""
+    """Two digits, and why a large one counts; very small ones depend on the noise, so only a bound is given."""
+    if p_value > SELECTION_TUNING.accepted_p_value:  # see `diagnosis.select.backward_elimination`
+        return f"{p_value:.2g}; it stays because simulations of held-out data are worse without it"
     return f"< {SMALLEST_P_VALUE:g}" if p_value < SMALLEST_P_VALUE else f"{p_value:.2g}"
 
 
