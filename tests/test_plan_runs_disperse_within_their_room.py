@@ -9,8 +9,7 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.plan.control.ships import capability
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.monte_carlo.guidance import open_loop
-from expdesign.plan.monte_carlo.risk import CollisionCheck
+from expdesign.plan.monte_carlo.risk import CollisionCheck, open_loop
 from expdesign.plan.runs import Fleet, dispersion_m, draw_truths
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import CALM, Environment, Variation

@@ -10,7 +10,7 @@ import shapely
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
-from expdesign.plan.legs import LegWater, nearest_turns
+from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.procedure import (
     ABORT_CAUSES,
     Tolerances,
@@ -447,16 +447,3 @@ class Guidance:
 
     def _allowed(self, samples: Array | float) -> Array | float:
         return PATIENCE * samples + self._waiting
-
-
-def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) -> Array:
-    """(k + 1, n, 3) poses of ships under commands (k, m), limited by the rates from the standing ones on."""
-    ships = np.flatnonzero(sailing & ~fleet.lost)
-    part, poses = fleet.part(ships), np.repeat(fleet.states[None, :, :3], len(values) + 1, axis=0)
-    turns = nearest_turns(helm.vessel, values[0], part.given) - values[0]
-    reach = helm.vessel.rates * helm.vessel.sample_time_s
-    for sample, row in enumerate(values, start=1):
-        part.advance(np.minimum(np.maximum(row + turns, part.given - reach), part.given + reach))
-        poses[sample, ships] = part.states[:, :3]
-    fleet.rejoin(part, ships)
-    return poses

@@ -19,8 +19,8 @@ import scipy
 import shapely
 
 from expdesign.plan.control import Helmsman
-from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo.guidance import GO_AROUNDS, Guidance, open_loop
+from expdesign.plan.legs import LegWater, nearest_turns
+from expdesign.plan.monte_carlo.guidance import GO_AROUNDS, Guidance
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, goal_within_m, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
 from expdesign.plan.values import Leg, LegOutcome, PlanSettings, RiskEstimate, SailedTrial
@@ -403,3 +403,16 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
         median_s=float(np.median(times)),
         most_s=float(np.quantile(times, UPPER_SHARE)),
     )
+
+
+def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) -> Array:
+    """(k + 1, n, 3) poses of ships under commands (k, m), limited by the rates from the standing ones on."""
+    ships = np.flatnonzero(sailing & ~fleet.lost)
+    part, poses = fleet.part(ships), np.repeat(fleet.states[None, :, :3], len(values) + 1, axis=0)
+    turns = nearest_turns(helm.vessel, values[0], part.given) - values[0]
+    reach = helm.vessel.rates * helm.vessel.sample_time_s
+    for sample, row in enumerate(values, start=1):
+        part.advance(np.minimum(np.maximum(row + turns, part.given - reach), part.given + reach))
+        poses[sample, ships] = part.states[:, :3]
+    fleet.rejoin(part, ships)
+    return poses
