@@ -115,7 +115,10 @@ def _or_skipped(path: Path, table: ChartTable, entry: Entry) -> Iterator[None]:
         if found is None:
             raise
         numbers = ", ".join(map(repr, (*table.skip_features, int(found[1]))))
-        way_out = f"or skip_features = [{numbers}] below [chart] of {entry.path.name}, which leaves it out"
+        way_out = (
+            f"or skip_features = [{numbers}] below [chart] of {entry.path.name}, which leaves it out: land or a danger "
+            "in it would then count as water"
+        )
         raise FileError(path, error.key, f"{error.problem}; {way_out}") from None
 
 
