@@ -63,7 +63,7 @@ def test_names_show_settings_as_people_say_them_and_nothing_else_changes() -> No
     for name, said in (
         (
             "turn-helm--0.349065850399-duration-60",
-            f"turn, helm {words.MINUS}20\N{DEGREE SIGN}, duration 60{words.NB}s",
+            f"turn, helm 20\N{DEGREE SIGN}{words.NB}to port, duration 60{words.NB}s",
         ),
         ("turn-0.2", "turn-0.2"),
     ):

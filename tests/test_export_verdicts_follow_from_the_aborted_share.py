@@ -101,3 +101,10 @@ def test_an_actuator_that_a_plan_never_uses_is_named(tmp_path) -> None:
             line for line in trial_remarks(scenario, replace(plan, commands=idle)) if "no run of this plan uses" in line
         ]
         assert [name in line for name in columns] == own
+
+
+def test_no_ship_that_left_allowed_water_is_not_told_as_never(tmp_path) -> None:
+    """The terminal said 0; the page has said the bound of 95 % confidence beside it."""
+    scenario = replace(load_scenario(write_scenario(tmp_path)), vessel=case.tug())
+    facts = plan_document(scenario, aborted(0.0)).facts
+    assert (facts["leave_water_probability"], facts["leave_water_probability_below"]) == (0.0, 0.006)

@@ -193,7 +193,7 @@ def names(primitives: Iterable[tuple[str, str, Mapping[str, float]]]) -> dict[st
     """Name in the files -> name as people say it; the same where two would be said alike.
 
     What a search added is called by its family and a letter, such as Zig-zag B; other names have angles in degrees and
-    speeds in knots, such as circle, speed 4 kn, helm 35\N{DEGREE SIGN}.
+    speeds in knots, such as circle, speed 4 kn, helm 35\N{DEGREE SIGN} to port.
 
     Args:
         primitives: name, family and settings of each, in order.
@@ -222,6 +222,8 @@ def _in_degrees_and_knots(name: str, settings: Mapping[str, float]) -> str:
         unit, factor = IN_NAMES.get(ending, ("", 1.0))
         stem, number_text = stem.replace("_", "-"), f"{value:.12g}"
         if unit and f"-{stem}-{number_text}-" in f"{name}-":
-            size = number(value * factor, 1) if ending == "mps" else significant(value * factor)
-            name = f"{name}-".replace(f"-{stem}-{number_text}-", f", {stem.replace('-', ' ')} {size}{unit}-")[:-1]
+            side = f"{NB}to port" if key == "helm_rad" and value < 0 else ""
+            shown = abs(value) if side else value
+            size = number(shown * factor, 1) if ending == "mps" else significant(shown * factor)
+            name = f"{name}-".replace(f"-{stem}-{number_text}-", f", {stem.replace('-', ' ')} {size}{unit}{side}-")[:-1]
     return name

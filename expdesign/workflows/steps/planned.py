@@ -165,7 +165,7 @@ def plan_document(case: Scenario, plan: Plan) -> Document:
         **_heel_summary(plan),
         "leave_water_probability": plan.leave_water_probability,
         **_risk_summary(plan.risk),
-        "design_efficiency_realised": plan.design_efficiency_realised,
+        "information_of_whole_track_over_optimum": plan.design_efficiency_realised,
     }
     broken_off = (f"Drawn trials: {plan.risk.note}.",) if plan.risk is not None and plan.risk.note else ()
     depths = () if plan.area.depths else (UNKNOWN_DEPTH,)
@@ -207,10 +207,11 @@ def _lattice_summary(proof: LatticeProof | None) -> dict[str, object]:
 
 
 def _risk_summary(risk: RiskEstimate | None) -> dict[str, object]:
-    """Results of drawn trials other than leaving allowed water; empty without such trials."""
+    """Results of drawn trials beside the share that leaves allowed water; empty without such trials."""
     if risk is None:
         return {}
     return {
+        "leave_water_probability_below": risk.left_most,  # with 95 % confidence: none of 500 is not never
         "drawn_trials": risk.trials,
         "aborted_share": risk.aborted,
         "extra_time_median_s": risk.extra_median_s,
