@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 import scipy
@@ -30,7 +31,7 @@ FEWEST, MOST_FREEDOM = 0.3, 1e5
 """Degrees of freedom from which a spread tells anything, and which count as any number."""
 LEAST_SHARE = 1e-9
 """Of the information, for a run to tell anything."""
-NORMAL_95 = float(scipy.special.ndtri(0.975))
+NORMAL_95 = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
