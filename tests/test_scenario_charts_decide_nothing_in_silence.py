@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -309,16 +310,20 @@ SWAPPED = {
 }
 
 
-@pytest.mark.parametrize("what", SWAPPED)
-def test_every_coordinate_with_its_numbers_swapped_is_refused_and_named(tmp_path, what):
-    path = in_the_bay(tmp_path)
+def check_swapped(path: Path, what: str) -> None:
+    """A scenario is read, and after a change it is refused in a line that names what is swapped."""
     load_scenario(path)
     change, key = SWAPPED[what]
-    change(tmp_path)
+    change(path.parent)
     with pytest.raises(FileError, match="swapped") as caught:
         load_scenario(path)
     assert caught.value.key == key
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("what", SWAPPED)
+def test_every_coordinate_with_its_numbers_swapped_is_refused_and_named(tmp_path, what):
+    check_swapped(in_the_bay(tmp_path), what)
 
 
 @pytest.mark.parametrize("what", [name for name, (_, key) in SWAPPED.items() if key.startswith("feature")])
@@ -326,12 +331,7 @@ def test_swapped_numbers_of_a_chart_are_named_where_no_bounds_are_given(tmp_path
     path = in_the_bay(tmp_path)
     area = tmp_path / "area.toml"
     area.write_text(re.sub(r"\[bounds\]\n(\w+_deg = .*\n)+", "", area.read_text(encoding="utf-8")), encoding="utf-8")
-    load_scenario(path)
-    change, key = SWAPPED[what]
-    change(tmp_path)
-    with pytest.raises(FileError, match="swapped") as caught:
-        load_scenario(path)
-    assert caught.value.key == key
+    check_swapped(path, what)
 
 
 def test_a_place_in_the_area_is_not_called_swapped(tmp_path):

@@ -6,7 +6,7 @@ from expdesign.durations.criteria import CRITERIA, Aim
 from expdesign.durations.efficiency import Efficiencies, efficiencies, limits_kept, pool_gains
 from expdesign.durations.large_scale import d_optimal, rows_of
 from expdesign.durations.limits import Budget, Constraints
-from expdesign.durations.mining import Subset, best_subset, build_recorded
+from expdesign.durations.mining import Subset, best_subset, build_recorded, require_told_apart
 from expdesign.durations.problem import (
     DurationProblem,
     InformationFloor,

@@ -140,7 +140,7 @@ def _pool(
         total_s=float(samples.sum()),
         mean_subtraction=mean_subtraction,
     )
-    _require_told_apart(problem, samples)
+    require_told_apart(problem, samples)
     definite = replace(problem, matrices=symmetric_part(problem.matrices))
     try:
         return definite, Collected.of(definite)
@@ -153,8 +153,16 @@ def _pool(
     return problem, collected
 
 
-def _require_told_apart(problem: DurationProblem, samples: Array) -> None:
-    """Refuse parameters that all batches together do not tell apart: their determinant is of rounding alone."""
+def require_told_apart(problem: DurationProblem, samples: Array) -> None:
+    """Refuse parameters that all batches together do not tell apart: their determinant is of rounding alone.
+
+    Args:
+        problem: of recorded batches or labels.
+        samples: (q,) of each, or anything in proportion.
+
+    Raises:
+        NotInformative: naming every combination.
+    """
     p = len(problem.parameters)
     total = np.tensordot(samples, problem.matrices, axes=1)
     moment = total[:p, :p] - total[:p, p:] @ np.linalg.solve(total[p:, p:], total[p:, :p])

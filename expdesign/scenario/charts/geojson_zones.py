@@ -138,7 +138,7 @@ def _check_order(features: Sequence[Feature], box: Box, name: str) -> None:
         if swapped_meets(np.array(list(positions_in(feature.geometry))), box):
             raise feature.entry.error(
                 f"lies {off_km(shapely.Point(first[index]), box):.4g} km outside {name}, expected [longitude, "
-                "latitude]: with the two swapped it lies in there"
+                "latitude]: with the two swapped it lies inside"
             )
 
 

@@ -10,7 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from expdesign import requests
-from expdesign.durations import Constraints, DurationDesign, build_recorded, pool_gains, solve_durations
+from expdesign.durations import (
+    Constraints,
+    DurationDesign,
+    build_recorded,
+    pool_gains,
+    require_told_apart,
+    solve_durations,
+)
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
 from expdesign.export.document import Document, Table, tabled
@@ -109,12 +116,6 @@ def _design_of(
     count = {item.name: labels.count(item.name) for item in dictionary}
     if asked.keep > len(labels):
         raise InputError(f"--keep is {asked.keep}, expected at most the {len(labels)} labelled pieces")
-    matrices = np.array([item.bordered(asked.mean) for item in dictionary])
-    if np.isnan(pool_gains(matrices)).all():
-        raise NotInformative(
-            "the labelled pieces together do not inform about every parameter; hold known ones with --fixed",
-            parameters=tuple(parameters),
-        )
     most = {name: number * piece_s for name, number in count.items() if number < asked.keep}
     problem = build_recorded(
         dictionary,
@@ -124,6 +125,12 @@ def _design_of(
         mean_subtraction=asked.mean,
         constraints=Constraints(most_s=most),
     )
+    if np.isnan(pool_gains(problem.matrices)).all():
+        raise NotInformative(
+            "the labelled pieces together do not inform about every parameter; hold known ones with --fixed",
+            parameters=tuple(parameters),
+        )
+    require_told_apart(problem, np.array([float(item.samples) for item in dictionary]))
     return solve_durations(problem)
 
 
