@@ -281,8 +281,32 @@ def test_dead_sensors_and_idle_inputs_are_noted(tmp_path: Path) -> None:
     record = loaded(tmp_path, data | {"wind_speed_mps": 0 * data["u_mps"] + 3, "n1_rps": 0 * data["u_mps"] + 5})
     assert record.notes == (
         "trial.csv: wind_speed_mps is 3 in all rows, a dead sensor?",
-        "trial.csv: n1_rps is 5 in all rows, so its effect cannot be estimated",
+        "trial.csv: n1_rps is 5 in all rows, so how its effect depends on it cannot be estimated",
     )
+
+
+@pytest.mark.parametrize("level", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("columns", "idle"),
+    [
+        (("n1_rps",), "n1_rps"),
+        (("reached_n1_rps",), "reached_n1_rps"),  # what is reached is used in place of the command
+        (("n1_rps", "reached_n1_rps"), "reached_n1_rps"),
+        (("n1_rps", "moving reached_n1_rps"), ""),
+        (("moving n1_rps", "reached_n1_rps"), "reached_n1_rps"),
+        (("moving n1_rps", "planned_n1_rps", "planned_rudder1_rad"), ""),
+    ],
+)
+def test_no_input_that_stands_still_is_called_a_dead_sensor(
+    tmp_path: Path, level: float, columns: tuple[str, ...], idle: str
+) -> None:
+    data = motion()
+    n1 = data.pop("n1_rps")
+    for column in columns:
+        data[column.removeprefix("moving ")] = n1 if column.startswith("moving ") else 0 * n1 + level
+    lost = "how its effect depends on it" if level else "its effect"
+    told = f"trial.csv: {idle} is {level:g} in all rows, so {lost} cannot be estimated"
+    assert loaded(tmp_path, data).notes == ((told,) if idle else ())
 
 
 @pytest.mark.parametrize(
@@ -295,7 +319,7 @@ def test_an_input_is_idle_where_no_file_moves_it(
     data = motion()
     columns = [data if level is None else data | {"n1_rps": 0 * data["u_mps"] + level} for level in levels]
     paths = [write_trial(tmp_path / f"{name}.csv", own) for name, own in zip("ab", columns, strict=True)]
-    idle = "a.csv and 1 more file: n1_rps is 5 in all rows, so its effect cannot be estimated"
+    idle = "a.csv and 1 more file: n1_rps is 5 in all rows, so how its effect depends on it cannot be estimated"
     assert load_records(paths).notes == (idle,) * told
 
 

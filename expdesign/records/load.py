@@ -142,7 +142,7 @@ UNCHECKED = ("time_s", "batch", STEERED, "depth_m", "lat_deg", "lon_deg")
 def table_remarks(table: Table) -> Iterator[str]:
     """Remarks on the columns of a file."""
     for name, values in table.columns.items():
-        if name not in UNCHECKED and not is_input(name) and np.ptp(values) == 0:
+        if name not in UNCHECKED and not is_input(input_name(name)) and np.ptp(values) == 0:
             yield f"{table.sources[name].header} is {table.value(name, 0)} in all rows, a dead sensor?"
     if "north_m" in table.columns:
         still = np.all(np.diff(table.stack("north_m", "east_m"), axis=0) == 0, axis=1)
@@ -209,13 +209,22 @@ def load_records(
         batches += found
         for note in remarks:
             notes.setdefault(note, []).append(name)
-        for column in filter(is_input, table.columns):
-            level = f"{table.sources[column].header} is {table.value(column, 0)}"
-            stands.setdefault(column, set()).add("" if np.ptp(table.columns[column]) > 0 else level)
+        for column in table.inputs:
+            stands.setdefault(column, set()).add(_idle(table, column))
     for values in stands.values():
         if values != {""} and len(values) == 1:  # another file may tell what one does not
-            notes[f"{values.pop()} in all rows, so its effect cannot be estimated"] = list(files.values())
+            notes[values.pop()] = list(files.values())
     return Record(batches=tuple(batches), notes=tuple(f"{_listed(names)}: {note}" for note, names in notes.items()))
+
+
+def _idle(table: Table, column: str) -> str:
+    """What cannot be learnt of an input that never moves, or "" where it does."""
+    used = REACHED + column if REACHED + column in table.columns else column  # as `_inputs` takes it
+    if np.ptp(table.columns[used]) > 0:
+        return ""
+    # a propeller at one speed still bears on a rudder behind it, and drives the ship
+    lost = "how its effect depends on it" if table.columns[used].any() else "its effect"
+    return f"{table.sources[used].header} is {table.value(used, 0)} in all rows, so {lost} cannot be estimated"
 
 
 def _listed(names: list[str]) -> str:
