@@ -1,11 +1,14 @@
 """Frozen values that hold arrays: shapes checked against shared letters, arrays read-only.
 
-A value with arrays is declared `@dataclass(frozen=True, kw_only=True, eq=False)` and calls `seal` once, at birth.
+A value with arrays is declared `@sealed(prior="p p", ...)`; one that makes or checks more at birth is a frozen
+dataclass that calls `seal` in its `__post_init__`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,13 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from expdesign.errors import ShapeError
 
 Array = NDArray[np.float64]
+Value = TypeVar("Value")
 ASIDE = {"aside": True}
 """Metadata of a field that says how a value came about, on which no result depends."""
 
 
 def readonly(values: ArrayLike) -> Array:
     """A read-only copy as floats; the array itself where it, and what it is a view of, are read-only already."""
-    if _sealed(values):
+    if _is_sealed(values):
         return np.asarray(values)
     array = np.array(values, dtype=float)
     array.setflags(write=False)
@@ -35,7 +39,7 @@ def closed(array: Array) -> Array:
     return array
 
 
-def _sealed(values: object) -> bool:
+def _is_sealed(values: object) -> bool:
     """Whether an array of floats is read-only, and so is what it is a view of."""
     while type(values) is np.ndarray and values.dtype == float and not values.flags.writeable:
         if values.base is None:
@@ -67,6 +71,17 @@ def seal(value: object, **shapes: str) -> None:
                 f"{type(value).__name__}.{name} has shape {array.shape}, expected ({letters}) with {sizes}"
             )
         object.__setattr__(value, name, array)
+
+
+@dataclass_transform(eq_default=False, kw_only_default=True, frozen_default=True)
+def sealed(**shapes: str) -> Callable[[type[Value]], type[Value]]:
+    """A frozen dataclass with keywords, equal to itself alone, whose arrays are sealed at birth, as by `seal`."""
+
+    def made(cls: type[Value]) -> type[Value]:
+        cls.__post_init__ = lambda self: seal(self, **shapes)  # type: ignore[attr-defined]
+        return dataclass(frozen=True, kw_only=True, eq=False)(cls)
+
+    return made
 
 
 def frozen_set(value: object, name: str, content: Any) -> None:

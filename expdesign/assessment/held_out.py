@@ -38,7 +38,7 @@ from expdesign.estimation.methods import Method
 from expdesign.estimation.regression import model_for
 from expdesign.estimation.replay import Integration, build_replay
 from expdesign.signals import Batch, Record
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Limit, Vessel, VesselModel
 
 SAME_ERROR = 0.02  # share of an error below which a difference of two does not count
@@ -54,7 +54,7 @@ UNBIASED = ("iv", "oe", "ls")
 """Solvers, those first that noise biases least."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(shares="n")
 class HeldOut:
     """Errors of one method's predictions."""
 
@@ -66,9 +66,6 @@ class HeldOut:
     bounded: bool = True  # whether the model stays near the speeds of the data where its inputs are held
     # (runs,) means over outputs of the logarithms of each run's errors, the same runs of all methods; or not known
     of_runs: Array | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, shares="n")
 
     @property
     def label(self) -> str:

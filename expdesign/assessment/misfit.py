@@ -27,8 +27,6 @@ UNSTABLE_GROWTH = 5.0  # growth of an error over a run above which the ship is u
 CANCELLING_SHARE = 1.1
 
 
-# One run, simulated with an estimated model from its first measured state and compared with the measurement.
-
 ESTIMATION, TEST = "estimation", "test"
 
 

@@ -24,8 +24,6 @@ from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import VesselModel
 
-# Estimates with their diagnostics.
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disturbances:
@@ -184,8 +182,6 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
         warnings=warnings,
     )
 
-
-# Options of an estimation.
 
 AUTO = "auto"
 CONTINUOUS, EULER = "continuous", "euler"

@@ -16,8 +16,6 @@ from expdesign.errors import NotInformative
 from expdesign.signals import Record, fit_percent
 from expdesign.values import Array
 
-# Numbers that steer measures of accuracy.
-
 # times after a start at which the growth of the error is measured [s]
 HORIZONS_S = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
 ABOUT = 1.25  # factor by which windows may be longer than that
@@ -37,8 +35,6 @@ CONSTANT_RANGE = 1e-9  # range of a constant input, as a share of its size
 # response of the motion to the inputs' changes, in standard deviations of the noise, at least
 LEAST_RESPONSE = 0.5
 
-
-# Whether data are sufficient for a diagnosis.
 
 PER_SECOND_DIFFERENCE = np.sqrt(6.0)
 """Standard deviation of second differences of white noise of unit variance."""
@@ -110,8 +106,6 @@ def white_noise_std(measured: Array) -> Array:
     mean = np.where(seen, second, 0.0) ** 2
     return np.asarray(np.sqrt(mean.sum(axis=(0, 1)) / np.maximum(seen.sum(axis=(0, 1)), 1)) / PER_SECOND_DIFFERENCE)
 
-
-# Accuracy of a simulation with the measured inputs: fit, error, bias, and growth of the error with the horizon.
 
 WHOLE_S = 1e9
 """Length of windows that are whole runs [s]."""

@@ -94,8 +94,6 @@ from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-# Causes selected for a model: searched for by likelihood, judged on held-out data, or compared by predictions.
-
 MORE_THAN_NOISE = 2.0
 """The simulation explains little of an output below `LITTLE_FIT`, if its error is so many times the noise."""
 VALIDATED, COMPARED, CONCLUDED = 4.0, 80.0, 25.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from expdesign.dictionary.trim import STEADY_CHANGE, drift, lost, motion_text, r
 from expdesign.errors import InputError, NoAnswer, SpeedOutOfReach, UnknownName, Unreachable
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import (
     NUMPY,
     Vessel,
@@ -224,10 +223,7 @@ def _not_held(vessel: Vessel, velocity: Array) -> str:
     return f"{found}needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, they give {given[0]:.4g}, {given[1]:.4g}"
 
 
-# Commands and entry states of many specifications of one duration, without building primitives.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(possible="n", velocity="n 3", entry_inputs="n m", commands="n k m")
 class ExcitedRuns:
     """Commands and entry states of specifications of one duration."""
 
@@ -235,9 +231,6 @@ class ExcitedRuns:
     velocity: Array  # (n, 3) entry u, v, r through water
     entry_inputs: Array  # (n, m) commands before the run
     commands: Array  # (n, k, m) within limits and rates
-
-    def __post_init__(self) -> None:
-        seal(self, possible="n", velocity="n 3", entry_inputs="n m", commands="n k m")
 
 
 def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:

@@ -10,10 +10,8 @@ import numpy as np
 from expdesign.conventions import to_b_frame
 from expdesign.errors import InputError, UnknownName
 from expdesign.signals import Commands, Trajectory
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
-
-# Manoeuvre families and requests for members of them.
 
 SEARCHED = ("", "surge", "sway", "yaw", "time", "share", "helm", "heading", "draw")
 """Kinds of searched settings: a velocity, a time within the run, a share of 1, a helm angle, a change of heading, the
@@ -39,6 +37,14 @@ class Setting:
 
 DURATION = Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5)
 WHOLE_PERIODS = replace(DURATION, meaning="duration of one run, best a whole number of periods")
+LARGEST = {"surge": 50.0, "sway": 20.0, "yaw": 5.0}
+"""Kind of a velocity -> largest size that a setting of it may have [m/s, m/s, rad/s]."""
+
+
+def velocity(kind: str, name: str, meaning: str, *, default: float | None = None, signed: bool = True) -> Setting:
+    """A velocity, or the size of one; positive ahead and to starboard."""
+    most = LARGEST[kind]
+    return Setting(name=name, meaning=meaning, default=default, low=-most if signed else 0.0, high=most, searched=kind)
 
 
 Reference = Callable[[Mapping[str, float], Array], Array]
@@ -108,10 +114,7 @@ def complete_settings(family: Family, given: Mapping[str, float]) -> dict[str, f
     return values
 
 
-# A manoeuvre primitive: commands, entry state, and simulated motion.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(entry_inputs="m")
 class Primitive:
     """One entry of the dictionary, simulated with the nominal vessel in calm water from the origin, heading north."""
 
@@ -121,9 +124,6 @@ class Primitive:
     commands: Commands  # actuator commands (k samples)
     entry_inputs: Array  # (m,) actuator commands before the run
     trajectory: Trajectory  # simulated motion, k + 1 samples; its first velocity is the entry velocity through water
-
-    def __post_init__(self) -> None:
-        seal(self, entry_inputs="m")
 
     @property
     def duration_s(self) -> float:

@@ -24,12 +24,12 @@ import scipy
 from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria import SINGULAR, Tangent
 from expdesign.durations.problem import DurationProblem
-from expdesign.values import ASIDE, Array, seal
+from expdesign.values import ASIDE, Array, sealed
 
 LP_TOLERANCE = 1e-10  # feasibility and optimality tolerance of linear programmes
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(mixture="m", prices="q")
 class Certificate:
     """Proof that no feasible design is better by more than the gap.
 
@@ -49,9 +49,6 @@ class Certificate:
     # nan where the problem is convex
     guaranteed: float = float("nan")
 
-    def __post_init__(self) -> None:
-        seal(self, mixture="m", prices="q")
-
     @property
     def gap(self) -> float:
         """bound - value."""
@@ -67,7 +64,7 @@ class Solver:
     wall_s: float  # how long it took [s], with loading these packages where they were not there
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(fractions="q", sensitivities="q")
 class DurationDesign:
     """Optimal durations with their certificate."""
 
@@ -86,9 +83,6 @@ class DurationDesign:
     note: str = ""  # a warning about the whole runs in one sentence, or ""
     # what found the fractions; the result does not depend on how long it took
     solver: Solver | None = field(default=None, metadata=ASIDE)
-
-    def __post_init__(self) -> None:
-        seal(self, fractions="q", sensitivities="q")
 
     @property
     def log_det_bound(self) -> float:

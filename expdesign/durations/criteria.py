@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from expdesign.durations.measures import LogDet, LogSmallest, LogTrace, Measure, SmoothMeasure
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 SINGULAR = 1e-13  # eigenvalues below this are rounding
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(unit="a", noise="b", gradients="o g")
 class Aim:
     """A criterion with its settings.
 
@@ -37,9 +37,6 @@ class Aim:
     outcomes: tuple[str, ...] = ()  # names of the predicted outcomes
     # (o, p) derivative of each outcome by the parameters, in the outcome's unit of error
     gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
-
-    def __post_init__(self) -> None:
-        seal(self, unit="a", noise="b", gradients="o g")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from expdesign.durations.criteria import whitening
 from expdesign.durations.measures import ONE_THREAD, gram, root
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 SMALLEST_SET = 50  # least size of a working set, and about as many as may join it at a time
 SET_PER_DIMENSION = 4  # the same per dimension of the information matrix
@@ -39,16 +39,13 @@ REGULAR_SET = 1e-8  # least eigenvalue of a first working set
 Indices = NDArray[np.intp]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(fractions="q")
 class LargeDesign:
     """A D-optimal approximate design."""
 
     fractions: Array  # (q,) of the candidates, sum 1
     gap: float  # upper bound on the log det of any design less that of this one
     dimension: int  # d
-
-    def __post_init__(self) -> None:
-        seal(self, fractions="q")
 
     @property
     def gap_relative(self) -> float:

@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from expdesign.errors import InputError, NoAnswer, UnknownName
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 LOOSENING = 1e-9  # share by which limits are loosened where they leave no interior
 
@@ -59,7 +59,7 @@ class Constraints:
 NO_CONSTRAINTS = Constraints()
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(least="q", most="q", rows="i q", limits="i")
 class Polytope:
     """Feasible time fractions."""
 
@@ -69,9 +69,6 @@ class Polytope:
     rows: Array  # (i, q) use per unit of fraction, each as a share of its limit
     limits: Array  # (i,) all 1, or 0 for budgets of 0
     labels: tuple[str, ...]  # (i) names of the rows
-
-    def __post_init__(self) -> None:
-        seal(self, least="q", most="q", rows="i q", limits="i")
 
     @property
     def plain(self) -> bool:

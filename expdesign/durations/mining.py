@@ -10,7 +10,7 @@ convex optimization, IEEE Trans. Signal Process. 57 (2009), 451-462.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from math import comb
 
@@ -24,12 +24,12 @@ from expdesign.durations.solve import optimal_shares
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.solve import null_space, require_informative
 from expdesign.information.recorded import BatchInformation
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 ALL_SUBSETS = 20_000  # up to this number, every subset of batches is evaluated
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(first="N")
 class Subset:
     """The chosen batches."""
 
@@ -44,9 +44,6 @@ class Subset:
     symmetric: bool
     # (N,) efficiency of the first 1, 2, ... N of `names`; 0 while they do not inform about every parameter.
     first: Array
-
-    def __post_init__(self) -> None:
-        seal(self, first="N")
 
 
 def best_subset(

@@ -30,7 +30,7 @@ from expdesign.errors import InputError
 from expdesign.estimation.regression import DIFFERENCE, EAST, NORTH, PRODUCT, STEADY_CURRENT, Share, heading_of
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 READINGS = (
     ("X_u", (("u: cos psi", -1.0), ("u: sin psi", -1.0))),
@@ -42,7 +42,7 @@ COMBINED = ("u", "v")
 """Equations whose air and water terms of second degree are estimated as one."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(mean="2", second="2", central="2", covariance="6 6")
 class Moments:
     """Mean and second moments of a disturbance (N, E), over ground to north and to east."""
 
@@ -56,20 +56,14 @@ class Moments:
     # 82 to 93 of 100 simulated trials
     covariance: Array
 
-    def __post_init__(self) -> None:
-        seal(self, mean="2", second="2", central="2", covariance="6 6")
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(mean="2", covariance="2 2")
 class MeasuredWind:
     """Mean and covariance over samples of the measured wind, over ground to north and to east."""
 
     mean: Array  # (2,) [m/s]
     covariance: Array  # (2, 2) [m^2/s^2], with the noise of the sensors
     samples: int  # with wind, velocity and heading
-
-    def __post_init__(self) -> None:
-        seal(self, mean="2", covariance="2 2")
 
 
 @dataclass(frozen=True, eq=False)

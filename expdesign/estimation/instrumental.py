@@ -32,8 +32,6 @@ EXACT_SHARE = 1e-12  # of the data's power, which residuals have at least where 
 PRIOR_SHARE = 1.0  # spread of a parameter without a stated standard deviation, relative to its size
 
 
-# Choices of an estimate that most users leave alone.
-
 STARTS = ("nominal", "ls")
 """Models that first instruments may come from: the one in use, or that of least squares."""
 

@@ -48,7 +48,7 @@ from expdesign.estimation.regression import Integers, Regression, Share, batch_s
 from expdesign.estimation.replay import Steered
 from expdesign.estimation.solve import NullSpace
 from expdesign.signals import Batch, Record
-from expdesign.values import Array, frozen_set, seal
+from expdesign.values import Array, frozen_set, seal, sealed
 from expdesign.vessel import VesselModel
 
 FEEDBACK_LAGS = 8  # past samples known to the test for feedback, and later ones tested
@@ -183,7 +183,7 @@ class Residuals:
         frozen_set(self, "rows_of", counts)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(values="p", covariance="p p", nuisance_values="q", joint_covariance="r r")
 class Estimate:
     """Parameters of a vessel model from data."""
 
@@ -207,9 +207,6 @@ class Estimate:
     # the test whether inputs that instruments are simulated from follow disturbances; None without one
     feedback: Feedback | None
     between_runs: Array | float = 0.0  # (p + q, p + q) what of `joint_covariance` is by how runs differ; 0 for nothing
-
-    def __post_init__(self) -> None:
-        seal(self, values="p", covariance="p p", nuisance_values="q", joint_covariance="r r")
 
     @property
     def std(self) -> Array:

@@ -211,8 +211,6 @@ SIGNS = {
 """Stem of a signal -> meaning of its sign."""
 
 
-# Distances to forbidden water ahead, to port and to starboard during a planned run.
-
 DIRECTIONS = {"ahead": 0.0, "starboard": np.pi / 2, "port": -np.pi / 2}
 
 

@@ -291,9 +291,6 @@ def _record(content: ReportContent) -> str:
     )
 
 
-# The cards as one page that prints on A4: a chart, an agenda, and the sheets in time order.
-
-
 def cards_html(content: ReportContent) -> str:
     """One HTML page without outside references; consecutive runs of one manoeuvre share a sheet.
 

@@ -32,8 +32,6 @@ MOST_SPREADS = 3.0
 COLOURED_BY_CHANCE = 0.01  # probability that any panel is coloured if nothing depends on anything
 
 
-# The variable that the simulation error depends on if a cause acts, for its figure.
-
 DEGREES = float(np.degrees(1.0))
 SQUARED = "\N{SUPERSCRIPT TWO}"
 SPEEDS = {"u": ("u [m/s]", 1.0), "v": ("v [m/s]", 1.0), "r": ("r [\N{DEGREE SIGN}/s]", DEGREES)}

@@ -36,9 +36,6 @@ DRAWN_METHODS = 3  # largest number of methods in the figures of runs
 STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
 
 
-# Sentences on an estimation: its parameters and data, and which estimate to use.
-
-
 def summary(found: Assessment, vessel: Vessel) -> list[str]:
     """The estimated parameters and the data, in a few sentences."""
     best = found.best

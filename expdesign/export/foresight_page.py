@@ -24,8 +24,6 @@ from expdesign.export.pages.figures import (
 )
 from expdesign.foresight import TOLD_APART, AddedRuns, Detectability, Foreseen, Foresight, OperationForesight, interval
 
-# Power, confusions and added runs as JSON and as rows for people.
-
 NONE = "\N{EN DASH}"
 HALF = 0.5
 MOST_LISTED = 5

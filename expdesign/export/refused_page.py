@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -24,7 +23,7 @@ from expdesign.export.pages.figures import (
 from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, sea_figure
 from expdesign.export.words import ship
 from expdesign.sea_area import SeaArea
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 DRAFT_POSES = 2000  # of the track of a refused plan at most
@@ -32,7 +31,7 @@ DRAFT_POSES = 2000  # of the track of a refused plan at most
 WIDTH_IN = 6.4
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(start="3", goal="3")
 class Refusal:
     """A refused plan."""
 
@@ -47,9 +46,6 @@ class Refusal:
     error: NoPlan  # the refusal
     earlier: tuple[str, ...] = ()  # names of results of an earlier attempt in the same folder
     command: str = ""  # how it came about
-
-    def __post_init__(self) -> None:
-        seal(self, start="3", goal="3")
 
     @property
     def track(self) -> Array:

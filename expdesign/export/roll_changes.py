@@ -57,8 +57,6 @@ def stability_words(before: float, after: float, *, mass_kg: float, load: tuple[
     )
 
 
-# Roll in a diagnosis: sentences, JSON, and the vessel with the changes found.
-
 UNCHANGED = "She rolls as her file says"
 
 
@@ -166,8 +164,6 @@ def with_roll(ship: Vessel, roll: RollVerdict | None) -> Vessel:
         return ship
     return replace(ship, pendulum=changes[0].pendulum)
 
-
-# Roll in a watch: sentences and JSON.
 
 SHOWN = 5
 

@@ -176,8 +176,6 @@ def live_sentences(content: LiveContent) -> list[str]:
     return found
 
 
-# Coverage of the state space, surfaces with the samples they were fitted to, and the simulation beside the data.
-
 MOST_POINTS = 3000
 
 

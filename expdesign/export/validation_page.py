@@ -34,8 +34,6 @@ AGREEING_STD = 0.10
 BIASED = 0.5  # bias over standard deviation beyond which an estimator does not count as consistent
 
 
-# Designs in Monte Carlo trials as JSON and sentences: which predictions hold, and which assumption fails if not.
-
 CHANCE = 0.01
 """Probability that a bias, or a wrong standard deviation, is reported where there is none."""
 ERROR_LIMIT = 1.5
@@ -253,9 +251,6 @@ def _entry(rehearsal: Rehearsal, result: Validated) -> dict[str, object]:
             for index, name in enumerate(result.parameters)
         },
     }
-
-
-# The page on designs in Monte Carlo trials.
 
 
 @page_figure

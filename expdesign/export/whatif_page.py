@@ -22,8 +22,6 @@ from expdesign.export.pages.figures import (
 from expdesign.export.whatif_content import DAY, Case, WhatIfContent, explanations
 from expdesign.export.words import counted
 
-# Figures of variants: time for the same accuracy, standard deviation of each parameter, runs.
-
 
 @page_figure
 def time_figure(content: WhatIfContent) -> str:

@@ -32,14 +32,14 @@ from expdesign.foresight.trial import Background, background, design_runs
 from expdesign.foresight.values import WANTED_POWER
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel, VesselModel
 
 NOT_BY_RUNS = ("change_point",)
 """Causes that are shown by when runs are sailed, not by which."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(each="q d d", prior="d d")
 class Wanted:
     """One effect that a trial must reveal, or distinguish from another."""
 
@@ -57,9 +57,6 @@ class Wanted:
     # freedom, level: of its test; where it is distinguished from another cause, of a gain that decides
     freedom: int
     level: float
-
-    def __post_init__(self) -> None:
-        seal(self, each="q d d", prior="d d")
 
     @property
     def within_std(self) -> bool:

@@ -17,13 +17,13 @@ from expdesign.dictionary import Primitive
 from expdesign.rehearsal.validation import heading_rad
 from expdesign.signals import Batch, Commands, Record, Trajectory
 from expdesign.simulation import Environment, draw_weather, measure, simulate
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 RECORDS = 12  # of a trial with nothing hidden, from which the errors of held-out runs are drawn
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(pose="3", velocity="3")
 class TrialRun:
     """One uninterrupted stretch of a trial."""
 
@@ -33,9 +33,6 @@ class TrialRun:
     velocity: Array  # (3,) over ground in the b-frame at the first sample [m/s, m/s, rad/s]
     # (m,) commands that stood before the first sample; None for those of the first sample
     standing: Array | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, pose="3", velocity="3")
 
 
 def design_runs(primitives: Sequence[Primitive], repeats: Sequence[int]) -> tuple[TrialRun, ...]:
@@ -114,9 +111,6 @@ def exact_record(runs: Sequence[tuple[str, Commands, Trajectory]], wind_to: Arra
             )
         )
     return Record(batches=tuple(batches))
-
-
-# A planned trial with nothing hidden, as a diagnosis sees it before it looks for causes.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,14 +10,13 @@ Proc. Vol. 17(2) (1984), 1603-1608; A. Waechter and L. T. Biegler, IPOPT, Math. 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from expdesign.simulation import motion_rates, rk4_step
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Operators, Vessel
 
 ITERATIONS = 300  # most iterations of the optimal control solver
@@ -27,7 +26,7 @@ END_MOTION = 1e-3  # share of their ranges that sway and yaw rate may have at th
 CALMNESS = 1e-4  # weight of the squared changes of commands, relative to the initial sensitivity
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(gradient="d d", limits="3 2", entry_inputs="m", commands="k m", velocity="n 3")
 class FreeForm:
     """Find the commands whose run has the largest trace(G B)."""
 
@@ -39,9 +38,6 @@ class FreeForm:
     entry_inputs: Array  # (m,) commands before the run
     commands: Array  # (k, m) initial guess
     velocity: Array  # (k + 1, 3) motion under the guess; its first row is fixed
-
-    def __post_init__(self) -> None:
-        seal(self, gradient="d d", limits="3 2", entry_inputs="m", commands="k m", velocity="n 3")
 
 
 def optimise_commands(problem: FreeForm) -> Array | None:

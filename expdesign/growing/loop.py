@@ -10,7 +10,7 @@ J. Kiefer and J. Wolfowitz, Canad. J. Math. 12 (1960), 363-366.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,25 +34,19 @@ from expdesign.growing.search import (
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import CALM, Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 FREE_FORM_EXCESS = 1e-6  # share of a range by which optimised commands may exceed a limit
 
 
-# The D-optimal shares of a dictionary, and the sensitivity of one more run.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(fractions="q", inverse="d d")
 class Optimum:
     """Shares of the time, the optimal ones or others, and their information."""
 
     fractions: Array  # (q,) time fractions
     log_det: float  # in physical scale
     inverse: Array  # (d, d) B^-1 in physical scale
-
-    def __post_init__(self) -> None:
-        seal(self, fractions="q", inverse="d d")
 
     @property
     def dimension(self) -> int:

@@ -22,7 +22,7 @@ from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Environment
 from expdesign.simulation.helm import steady_ahead
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 DRAWS = 100_000  # random draws of a family among which the search chooses
@@ -117,9 +117,6 @@ def _axis(vessel: Vessel, setting: Setting, limits: Array, run_s: float) -> Axis
     return Axis(name=setting.name, low=low, high=max(high, low + 1e-9), scale=scale)
 
 
-# Settings and results of the growth of a dictionary.
-
-
 @dataclass(frozen=True, kw_only=True)
 class GrowSettings:
     """Settings of the search for manoeuvres that add information to a dictionary."""
@@ -160,7 +157,7 @@ class GrowRound:
     excitation_condition: bool  # as in `PrimitiveInformation`
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(limits="3 2")
 class Growth:
     """A grown dictionary."""
 
@@ -172,9 +169,6 @@ class Growth:
     dimension: int  # p, plus means with complete mean subtraction
     parameters: int  # p
     best_left: float  # largest sensitivity found at the end
-
-    def __post_init__(self) -> None:
-        seal(self, limits="3 2")
 
     @property
     def efficiency_left(self) -> float:
@@ -199,7 +193,7 @@ REDRAWN = 0.3  # share of local steps that take another random draw, where the f
 LEAST_COST = 0.02  # least cost of a second of a run that makes way good, in seconds
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(gradient="d d")
 class Worth:
     """What a run's information is worth, per second that the run costs."""
 
@@ -208,25 +202,19 @@ class Worth:
     leg_s: float = 0.0  # time of the leg that each run brings
     saved_s_per_m: float = 0.0  # time that a metre made good saves elsewhere
 
-    def __post_init__(self) -> None:
-        seal(self, gradient="d d")
-
     def of(self, matrices: Array, made_good_m: Array, run_s: float) -> Array:
         """(n,) scores of runs with information B (n, d, d) and distances made good (n,)."""
         cost = 1.0 + (self.leg_s - self.saved_s_per_m * made_good_m) / run_s
         return np.asarray(np.einsum("ij,nji->n", self.gradient, matrices) / np.maximum(cost, LEAST_COST))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(matrices="n d d", excess="n", made_good_m="n")
 class Runs:
     """Evaluated specifications."""
 
     matrices: Array  # (n, d, d) B of each; 0 for impossible runs
     excess: Array  # (n,) violations of the limits; infinite for impossible runs
     made_good_m: Array  # (n,) distance from begin to end through water
-
-    def __post_init__(self) -> None:
-        seal(self, matrices="n d d", excess="n", made_good_m="n")
 
     def __getitem__(self, rows: slice | np.ndarray) -> Runs:
         return Runs(matrices=self.matrices[rows], excess=self.excess[rows], made_good_m=self.made_good_m[rows])

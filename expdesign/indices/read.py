@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -15,13 +15,13 @@ from expdesign.conventions import wrap_angle
 from expdesign.indices.criteria import ZIGZAG_DEVIATION_RAD, Circle, Execute, Stop, ZigZag
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Helm
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import KINDS, Vessel
 
 Curve = Callable[[float], float]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(time_s="k", pose="k 3", velocity="k 3", helm_rad="j", drive="j")
 class SteeredRun:
     """Motion and orders of one run; between samples positions and heading are cubics that fit the velocities."""
 
@@ -33,9 +33,6 @@ class SteeredRun:
     helm_rad: Array  # (j,) helm angle in the actuators' own sense, each from its sample to the next
     drive: Array  # (j,) engine order or mean propeller speed, ahead positive, likewise
     tolerance_s: float  # of the times of orders: one sample of a record, 0 in a simulation
-
-    def __post_init__(self) -> None:
-        seal(self, time_s="k", pose="k 3", velocity="k 3", helm_rad="j", drive="j")
 
     @cached_property
     def _motion(self) -> scipy.interpolate.CubicHermiteSpline:

@@ -34,7 +34,7 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate, to_body
 from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY, Vessel, VesselModel
 
 IDEAL_SHARE = 1e-12  # variance of an ideal sensor's noise, in that of the noisiest, where equations are weighed by it
@@ -42,7 +42,7 @@ VELOCITY_STEP = 1e-6  # step of central differences, relative to the larger of 1
 SINGULAR = 1e12  # condition number above which a trial counts as uninformative
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(velocity="3")
 class TrialPart:
     """Consecutive samples of a trial: commands run from a velocity."""
 
@@ -51,9 +51,6 @@ class TrialPart:
     heading_rad: float = 0.0  # at the first sample; matters in wind or current
     standing: Array | None = None  # (m,) commands before the first sample; None for those of the first sample
     repeats: float = 1.0  # number of runs, with independent noise; may be a fraction, as an average
-
-    def __post_init__(self) -> None:
-        seal(self, velocity="3")
 
 
 def expected_covariance(

@@ -28,9 +28,6 @@ RUNS_AT_ONCE = 2048  # runs simulated together, so that their states stay in the
 REGRESSOR_ROUNDING = 1e-12  # a regressor below this share of its possible size is rounding
 
 
-# The information of one primitive about the parameters.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PrimitiveInformation:
     """Per-sample moments of regressors and instruments over one run (thesis (7.50)-(7.55))."""

@@ -10,7 +10,6 @@ Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3 and (7.50)-(7.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,13 +20,13 @@ from expdesign.information.moments import MEAN_SUBTRACTIONS
 from expdesign.reduction import with_delivered_inputs
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import VesselModel
 
 REGRESSORS = ("measured", "simulated")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(X="p p", Y="p n", Z="p n")
 class BatchInformation:
     """Per-sample moments of one measured batch."""
 
@@ -37,9 +36,6 @@ class BatchInformation:
     X: Array  # (p, p) mean of Phi Z^T
     Y: Array  # (p, n) mean of Phi
     Z: Array  # (p, n) mean of the instruments
-
-    def __post_init__(self) -> None:
-        seal(self, X="p p", Y="p n", Z="p n")
 
     def bordered(self, mean_subtraction: str) -> Array:
         """(d, d) as of a primitive: [[X, Y], [Z^T, I]], or with the batch's own means taken off."""

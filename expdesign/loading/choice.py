@@ -43,7 +43,7 @@ from expdesign.roll import (
 from expdesign.roll.runs import LEAST_SAMPLES_PER_PERIOD
 from expdesign.signals import AUXILIARY, Trajectory
 from expdesign.simulation import rudder_angle, simulate
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NOMINAL, Load, RollPendulum, Vessel
 
 RATE, ANGLE, READING = (AUXILIARY.index(name) for name in ("roll_rate_radps", "roll_rad", "imu_lateral_mps2"))
@@ -150,7 +150,7 @@ WEIGHED = ("m", "z_m")
 """Parameters of an unknown load."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(theta="9", size="p", prior="p p")
 class Question:
     """What is sought, from which ship with which loads."""
 
@@ -160,9 +160,6 @@ class Question:
     theta: Array  # (9,) parameters, as believed
     size: Array  # (p,) of each free parameter, positive: its value, or its standard deviation where it is about zero
     prior: Array  # (p, p) information about relative changes, change over size, before the trial
-
-    def __post_init__(self) -> None:
-        seal(self, theta="9", size="p", prior="p p")
 
     @property
     def places(self) -> list[int]:
@@ -264,7 +261,7 @@ class Step:
     smallest: float  # singular value of the relative sensitivity of their equations
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(repeats="l q", std_before="p", std_after="p")
 class LoadPlan:
     """Load cases of a trial."""
 
@@ -279,9 +276,6 @@ class LoadPlan:
     std_before: Array
     std_after: Array
     faintest: Direction  # the combination with the least information, relative standard deviation 1 / size
-
-    def __post_init__(self) -> None:
-        seal(self, repeats="l q", std_before="p", std_after="p")
 
 
 def choose_loads(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from expdesign.errors import NotInformative
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 KNOWN_WITHIN = 6.0  # a change is watched for where its size is so many standard errors of the reference
 
@@ -50,7 +50,18 @@ LEAST_SURPRISE = 0.1
 """Of a stretch on average, where the reference shows no force."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(
+    std="h",
+    ramp="o",
+    baseline="m",
+    baseline_covariance="m m",
+    inflation="m",
+    rate="m",
+    alike="m m",
+    load="m",
+    weights="m q",
+    surprise="m",
+)
 class Calibration:
     """What a reference tells of noise, of the unmeasured force and of the ship."""
 
@@ -71,21 +82,6 @@ class Calibration:
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
     shoal_limit: float  # draught over depth beyond which the water is shallower than the reference's
-
-    def __post_init__(self) -> None:
-        seal(
-            self,
-            std="h",
-            ramp="o",
-            baseline="m",
-            baseline_covariance="m m",
-            inflation="m",
-            rate="m",
-            alike="m m",
-            load="m",
-            weights="m q",
-            surprise="m",
-        )
 
     @property
     def loads(self) -> NDArray[np.int64]:

@@ -31,7 +31,7 @@ from expdesign.monitoring.changes import Change
 from expdesign.monitoring.compass import RATE, turned
 from expdesign.monitoring.noise import WHITE, Noise, learnt_noise, whitened
 from expdesign.signals import Batch, Record
-from expdesign.values import Array, seal
+from expdesign.values import Array, seal, sealed
 
 STRETCH_S = 60.0  # length of the stretches that are simulated [s], for a ship of `length_m`
 LENGTH_M = 20.0  # see there [m]
@@ -366,7 +366,7 @@ def _forces(linear: LinearisedMotion) -> list[Disturbance]:
     return [*pushes(np.sqrt(3.0) * np.linspace(-1.0, 1.0, k - 1)), *winds, *flows, *pushes(np.ones(k - 1))]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(time_s="w", products="w c c", counts="w", heading="w")
 class Stretches:
     """What w stretches hold, for a known noise and whatever their initial velocities are."""
 
@@ -376,9 +376,6 @@ class Stretches:
     changes: int  # m
     heading: Array  # (w,) as in `Grams`
     winds: int = 0  # columns of winds, the first of F
-
-    def __post_init__(self) -> None:
-        seal(self, time_s="w", products="w c c", counts="w", heading="w")
 
     def __len__(self) -> int:
         return len(self.time_s)

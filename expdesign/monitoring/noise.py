@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 FEWEST = 20  # stretches from which noise is learnt
 FIRST_BIN = 2  # of a stretch's spectrum: below it the initial velocities and steady forces explain the error
@@ -33,7 +33,7 @@ LEAST_SHARE = 1e-8  # of the variance in the variance of a source
 AXES = 3
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(std="4", pushes="3", waves="3")
 class Noise:
     """Sources of the error within a stretch, beside what the calibration learns of all."""
 
@@ -43,9 +43,6 @@ class Noise:
     period_s: float  # of the waves [s]
     kept: float  # share of their motion that a second leaves
     unlike: float = 0.0  # deviance of a stretch's spectra from these sources, beyond chance, where they were learnt
-
-    def __post_init__(self) -> None:
-        seal(self, std="4", pushes="3", waves="3")
 
     @property
     def white(self) -> bool:

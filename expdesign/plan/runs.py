@@ -17,14 +17,14 @@ from expdesign.simulation import ActuatorState, Environment, Variation, draw_env
 from expdesign.simulation.environment import vary
 from expdesign.simulation.program import RatesProgram
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 from expdesign.vessel.vessel import covering_discs, disc_points, thinned_poses
 
 FEW_SHIPS = 128  # up to so many are quicker one by one than by an operation on all of them at a time
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(parameters="n p", current_to="n 2", wind_to="n 2")
 class Truths:
     """True parameters and mean weather of n ships."""
 
@@ -32,9 +32,6 @@ class Truths:
     # current_to, wind_to: (n, 2) means of their trials [m/s]
     current_to: Array
     wind_to: Array
-
-    def __post_init__(self) -> None:
-        seal(self, parameters="n p", current_to="n 2", wind_to="n 2")
 
 
 class Weather:
@@ -359,9 +356,6 @@ def _radius(apart: Array, confidence: float, name: str) -> Array:
             which=name,
         )
     return np.asarray(factor * shape)
-
-
-# Runs as placed shapes: the discs that cover the swept hull, the clearance they need, and the displacement.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any, TypeVar
@@ -49,7 +49,7 @@ from expdesign.plan.values import Leg, Placement, Plan, PlanProblem, RiskEstimat
 from expdesign.plan.verify import realised_efficiencies
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 LEAST_CONFIDENCE = 0.5  # below which none is named as a remedy
 WIDENING = 1.4  # factor on a run's room then; legs get the same share of a hull length more clearance
@@ -283,7 +283,7 @@ def _budget(problem: PlanProblem) -> WorkBudget:
     return WorkBudget(most_s=REPLAN_BUDGETS * problem.settings.time_budget_s)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(made_good_m="legs", late_s="legs")
 class Draft:
     """A trial as sailed by the planner, before verification, risk and bound."""
 
@@ -300,9 +300,6 @@ class Draft:
     # it is not known
     late_s: Array
     known: KnownLegs  # legs found for it, which a like trial need not seek again
-
-    def __post_init__(self) -> None:
-        seal(self, made_good_m="legs", late_s="legs")
 
     @property
     def runs_beyond_s(self) -> float:

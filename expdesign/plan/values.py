@@ -16,7 +16,7 @@ from expdesign.durations import DurationDesign
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, to_body
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY, Vessel
 
 ITERATION_S = 2e-4  # one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s]
@@ -93,15 +93,12 @@ class PlanSettings:
     paths: PathsName = "ompl"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(velocity="3", inputs="m")
 class UnderWay:
     """The motion with which a plan begins."""
 
     velocity: Array  # (3,) surge and sway over ground m/s, yaw rate rad/s
     inputs: Array  # (m,) commands standing, which the actuators deliver
-
-    def __post_init__(self) -> None:
-        seal(self, velocity="3", inputs="m")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -343,15 +340,12 @@ class Plan:
         return self.sailed.seconds(kind)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(pose="3")
 class Placement:
     """Where one run starts."""
 
     primitive: str  # name
     pose: Array  # (3,) start pose in the n-frame
-
-    def __post_init__(self) -> None:
-        seal(self, pose="3")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -363,7 +357,7 @@ class Placements:
     lattice: LatticeProof | None = None  # proof of the lattice planner
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(start="3", goal="3")
 class PlanProblem:
     """A trial to be planned."""
 
@@ -382,9 +376,6 @@ class PlanProblem:
     expected: bool = False
     # how the ship moves at the start; None where it is at rest through the water there
     under_way: UnderWay | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, start="3", goal="3")
 
     @property
     def repeats(self) -> dict[str, int]:

@@ -336,8 +336,6 @@ def _inputs(table: Table, columns: tuple[str, ...], part: slice) -> Array:
     return np.where([REACHED + column in table.columns for column in columns], means, commanded)
 
 
-# Labels of manoeuvres in measured data: a column of texts, or the beginnings of the files' names.
-
 LABEL_SOURCES = ("column", "file")
 """Where labels are: in the column `manoeuvre`, or before the first underscore of a file's name."""
 

@@ -119,8 +119,6 @@ def _block_means(rows: Array, count: int) -> Array:
     return np.asarray(np.where(2 * number >= count, means, np.nan))
 
 
-# Remarks on what was undone of the sensors of a batch, and what could not be.
-
 STATED = "As the vessel file states, "
 
 

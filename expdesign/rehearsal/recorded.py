@@ -32,7 +32,7 @@ from expdesign.estimation.replay import (
 )
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
-from expdesign.values import Array, seal
+from expdesign.values import Array, seal, sealed
 from expdesign.vessel import VesselModel
 
 SINGULAR = 1e-12  # least singular value of scaled equations, as a share of the largest, that still gives an estimate
@@ -150,7 +150,7 @@ def recorded_pieces(
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(rmse="d n", degenerate="d")
 class Drawn:
     """A design, drawn many times from the pieces."""
 
@@ -162,9 +162,6 @@ class Drawn:
     # (d,) 1 where there is no estimate, the model diverges, or its error in some output is larger than the motion
     # itself; else 0
     degenerate: Array
-
-    def __post_init__(self) -> None:
-        seal(self, rmse="d n", degenerate="d")
 
     @property
     def norm(self) -> Array:

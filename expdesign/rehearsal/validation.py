@@ -43,7 +43,7 @@ from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, mean_weather, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 CHUNK_TRIALS = 20  # trials in one chunk; each chunk has its own random stream
@@ -90,7 +90,7 @@ class Rehearsal:
             raise InputError(f"trials is {self.trials}, expected 2 or more")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(truth="p", estimates="n p", stated="n p", forecast="p", theory="p")
 class Validated:
     """The result of one design."""
 
@@ -103,9 +103,6 @@ class Validated:
     forecast: Array  # (p,) standard deviations predicted with the nominal model, nan for random designs
     theory: Array  # (p,) standard deviations predicted with the true ship; nan for random designs
     failed: int  # number of trials without an estimate
-
-    def __post_init__(self) -> None:
-        seal(self, truth="p", estimates="n p", stated="n p", forecast="p", theory="p")
 
     @property
     def found(self) -> Array:
@@ -332,7 +329,7 @@ def trial_parts(
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(nominal="p", estimates="n p")
 class Alone:
     """Estimates from one primitive alone."""
 
@@ -342,9 +339,6 @@ class Alone:
     nominal: Array  # (p,) parameters of the ship that was simulated
     estimates: Array  # (n, p) of the trials that give one
     failed: int  # trials without an estimate
-
-    def __post_init__(self) -> None:
-        seal(self, nominal="p", estimates="n p")
 
     @property
     def informative(self) -> bool:

@@ -149,9 +149,6 @@ def _count(option: str, text: str) -> int:
     return int(text)
 
 
-# Arguments and options that several commands share.
-
-
 def out_option(default: str) -> object:
     """`--out`; `default` says where results go without it."""
     return Option("--out", "-o", metavar="FOLDER", help=f"Folder for the results. Default: {default}.")

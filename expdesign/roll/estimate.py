@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -52,7 +52,7 @@ from expdesign.roll.problem import (
 )
 from expdesign.roll.profile import load_interval
 from expdesign.roll.regression import MOST_SURPRISE, flat_spectrum, spectrum
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.roll import G_MPS2, Load
 
@@ -76,7 +76,7 @@ UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave
 METHODS = ("iv", "ls")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(theta="9", covariance="p p", sensed="q p", rounds="r 9")
 class RollEstimate:
     """The estimate."""
 
@@ -102,9 +102,6 @@ class RollEstimate:
     effects: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     tilt_told: bool = True  # whether the sensor's tilt was measured, or the data tell it
     load_interval: tuple[float, float] | None = None  # of m, 95 % by its profile [kg]; None where it is not sought
-
-    def __post_init__(self) -> None:
-        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9")
 
     @property
     def std(self) -> dict[str, float]:
@@ -368,9 +365,6 @@ def metacentric_height(estimate: RollEstimate, load: Load | None) -> tuple[float
     changes = [height(estimate.theta + step) - height(estimate.theta - step) for step in steps]
     slope = np.array(changes) / (2.0 * SMALL_STEP * problem.scale[problem.places])
     return height(estimate.theta), math.sqrt(max(float(slope @ estimate.covariance @ slope), 0.0))
-
-
-# An estimate as the roll pendulum of a vessel.
 
 
 def fitted_pendulum(estimate: RollEstimate) -> RollPendulum:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import UnknownName
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel.roll import G_MPS2, Body, Load
 from expdesign.waves import froude_factor
 
@@ -75,15 +75,12 @@ def froude_scaled(values: Array, scale: float) -> Array:
     return np.asarray(values * [froude_factor(FROUDE[name], scale) for name in PARAMETERS])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(values="c", jacobian="c 9")
 class Coefficients:
     """Coefficients with derivatives by the parameters."""
 
     values: Array  # (5,)
     jacobian: Array  # (5, 9)
-
-    def __post_init__(self) -> None:
-        seal(self, values="c", jacobian="c 9")
 
 
 def coefficients(theta: Array, body: Body, load: Load | None) -> Coefficients:

@@ -22,7 +22,7 @@ import numpy as np
 from expdesign.roll.estimate import UNSEEN, RollEstimate
 from expdesign.roll.model import PARAMETERS, UNITS, named, relative_sensitivity
 from expdesign.roll.problem import RollProblem
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel.roll import Body, Load
 
 OPEN_SIZES = 5.0  # change along an open direction that is counted with, in sizes of the parameter that it moves most
@@ -52,7 +52,7 @@ class Cure:
     rank: int  # of the parameters with it
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(singular_values="p")
 class NullSpace:
     """The report."""
 
@@ -66,9 +66,6 @@ class NullSpace:
     undetermined: tuple[str, ...]
     faint: tuple[Direction, ...]  # directions that these data show too faintly
     cures: tuple[Cure, ...]  # the best first; none where nothing is open or faint
-
-    def __post_init__(self) -> None:
-        seal(self, singular_values="p")
 
 
 def null_space(estimate: RollEstimate) -> NullSpace:

@@ -20,8 +20,6 @@ from expdesign.values import Array
 from expdesign.vessel import IDEAL, ROLL_PARAMETERS, RollPendulum, Vessel
 from expdesign.vessel.roll import G_MPS2, Body, Load
 
-# Runs of roll from batches of measured data.
-
 NEEDED = ("roll_rate_radps", "imu_lateral_mps2")
 """Columns needed besides r_radps and the rudder."""
 

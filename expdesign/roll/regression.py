@@ -6,13 +6,12 @@ Source: doctoral thesis on grey-box identification of roll with few sensors, (4.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run, level
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 # of the noise of roll rates to that of other signals, as they enter the equation, that are tried
 NOISE_RATIOS = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
@@ -40,16 +39,13 @@ def difference(signals: Array) -> Array:
     return result
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(y="n", X="n 5", effects="n 3 6")
 class Rows:
     """The equation y = X theta + noise of one run, whitened, without its mean and its first samples."""
 
     y: Array  # (n,) roll rate
     X: Array  # (n, 5) regressors
     effects: Array  # (n, 3, 6) of y and X, by `Run.effects`
-
-    def __post_init__(self) -> None:
-        seal(self, y="n", X="n 5", effects="n 3 6")
 
     def residuals(self, values: Array) -> Array:
         """(n,) residuals at coefficients (5,)."""
@@ -131,16 +127,13 @@ def regressors(signals: Array) -> Array:
     return np.column_stack([-delayed(signals[:, 0], (1, 2)), difference(signals[:, 1:])])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(density="f")
 class Spectrum:
     """Spectral density of residuals at the frequencies j / n of a real transform of length n, j = 0 to n / 2."""
 
     density: Array  # (f,) two-sided; its mean over all n frequencies is the variance
     length: int  # n, even
     freedom: float  # degrees of freedom of the estimate at one frequency; infinite for a density that is given
-
-    def __post_init__(self) -> None:
-        seal(self, density="f")
 
     def divided(self, signals: Array) -> Array:
         """Signals (k, q), k up to half the length, through the filter 1 / density, which shifts nothing in time."""
@@ -234,15 +227,12 @@ def _transform_length(residuals: Sequence[Array]) -> int:
     return 2 * int(scipy.fft.next_fast_len(max(map(len, residuals)), real=True))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(past="a", moving="c")
 class NoiseModel:
     """Residuals e = (C / D) n with white n, in powers of the delay; its inverse whitens."""
 
     past: Array  # (o + 1,) D, 1 first
     moving: Array  # (o + 1,) C, 1 first
-
-    def __post_init__(self) -> None:
-        seal(self, past="a", moving="c")
 
     def whitened(self, signals: Array) -> Array:
         """Signals (k, ...) through D / C."""

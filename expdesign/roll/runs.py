@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative
-from expdesign.values import Array, seal
+from expdesign.values import Array, seal, sealed
 from expdesign.vessel.roll import Load
 
 PASSED_GAIN = 0.9  # least gain of the low-pass filter at the roll frequency
@@ -79,7 +79,7 @@ def level(signals: Array, tilt_rad: float) -> Array:
 # Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing (2010), 7.5, for windowed filters.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(taps="n")
 class LowPass:
     """The filter and what it does."""
 
@@ -89,9 +89,6 @@ class LowPass:
     passed: float  # gain at that frequency
     bandwidth_hz: float  # at which the gain is 1 / sqrt 2; half the sample rate where it is never as low
     step_s: float  # between the samples that are kept [s]
-
-    def __post_init__(self) -> None:
-        seal(self, taps="n")
 
     def gain(self, frequency_hz: float) -> float:
         """Gain at a frequency."""

@@ -14,7 +14,7 @@ from expdesign.plan.values import PlanSettings, UnderWay
 from expdesign.sea_area import SeaArea
 from expdesign.shortest_day import AccuracySettings
 from expdesign.simulation.environment import Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel, column_name
 
 
@@ -55,7 +55,7 @@ class DesignSettings:
     accuracy: AccuracySettings | None = None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(start="3", goal="3")
 class Scenario:
     """A scenario file and the files that it names, as values."""
 
@@ -73,9 +73,6 @@ class Scenario:
     environment: Environment  # forecast
     under_way: UnderWay | None = None  # how the ship moves at the start; None where it is at rest through the water
     told: tuple[str, ...] = ()  # notes on what imports of measured data tell of the vessel
-
-    def __post_init__(self) -> None:
-        seal(self, start="3", goal="3")
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -35,16 +35,14 @@ from expdesign.information.prior import equation_noise
 from expdesign.rehearsal import trial_parts
 from expdesign.shortest_day.values import AccuracySettings
 from expdesign.simulation import CALM, Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, seal, sealed
 from expdesign.vessel import Vessel
-
-# Limits on the standard deviations of parameters, and on the 95 % intervals of outcomes of standard trials.
 
 NORMAL_95 = 1.959963984540054
 """Half of the interval that holds a normal variable in 95 of 100 cases, in standard deviations."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(slopes="k p", std="k", prior="p p")
 class Limits:
     """Largest standard deviations of parameters and of outcomes."""
 
@@ -53,9 +51,6 @@ class Limits:
     std: Array  # (k,) largest standard deviation of each
     prior: Array  # (p, p) information known before, in the parameters' units
     outcomes: int = 0  # how many of them, at the end, are outcomes
-
-    def __post_init__(self) -> None:
-        seal(self, slopes="k p", std="k", prior="p p")
 
     def found(self, covariance: Array) -> Array:
         """(k,) standard deviations with estimates of a covariance (p, p), and what is known before."""

@@ -20,7 +20,7 @@ from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.solve import Draft
 from expdesign.plan.values import PlanProblem
 from expdesign.signals import Trajectory
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 FIRST_SHARE = 0.4  # information from runs in the first day, as a share of what is needed; legs tell the rest
 COURSES = 4  # on which runs are taken to be sailed
@@ -30,9 +30,6 @@ OTHER_RUNS = 1  # of each manoeuvre that it has more or fewer, at most
 AVERAGE_LEGS = 2.0  # legs to one manoeuvre that the average of all legs counts as, once days have been planned
 LEAST_LEG_S = 5.0  # least of it once days have been planned [s]
 MOST_RUNS = 200  # of one primitive
-
-
-# What runs tell that make way good from start to goal: their headings follow from the way.
 
 
 def runs_along(problem: PlanProblem, courses: Array) -> Array:
@@ -75,10 +72,7 @@ def courses_of(track: Trajectory) -> Array:
     return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
 
 
-# Runs to choose from, what they cost, save and tell.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(matrices="q d d", cost_s="q", saved_s="q", known="d d", fewest="q", most="q")
 class Offer:
     """Runs to choose from."""
 
@@ -91,9 +85,6 @@ class Offer:
     fewest: Array
     most: Array
 
-    def __post_init__(self) -> None:
-        seal(self, matrices="q d d", cost_s="q", saved_s="q", known="d d", fewest="q", most="q")
-
     def information(self, runs: Array) -> Array:
         """(d, d) of runs (q,), and what is known."""
         return np.asarray(self.known + np.tensordot(runs, self.matrices, axes=1))
@@ -103,7 +94,7 @@ class Offer:
         return float(runs @ self.cost_s) - min(float(runs @ self.saved_s), self.way_s)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(cost_s="q", saved_s="q", runs="q d d", leg="d d", goal="d d")
 class Prices:
     """Costs and information at the margin."""
 
@@ -114,9 +105,6 @@ class Prices:
     leg: Array  # (d, d) information of the leg that leads to it
     goal: Array  # (d, d) information of the leg to the goal
     level: float = 0.0  # margin of the accuracy that runs and legs must reach by these estimates
-
-    def __post_init__(self) -> None:
-        seal(self, cost_s="q", saved_s="q", runs="q d d", leg="d d", goal="d d")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.durations import DurationDesign
 from expdesign.plan.values import Plan
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 DRAFT_POOL, DRAFT_SEARCHES = 8, 1  # candidates of every family, and searches, of a draft, at most
 
@@ -56,7 +56,7 @@ class DayParts:
     legs_s: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(velocities="3 2")
 class DayBound:
     """What no day of a class takes less than.
 
@@ -73,16 +73,13 @@ class DayBound:
     velocities: Array  # (3, 2) limits of u, v and r through water [m/s, rad/s]
     speed_mps: float  # largest speed through water, in any direction
 
-    def __post_init__(self) -> None:
-        seal(self, velocities="3 2")
-
     @property
     def day_s(self) -> float:
         """Of the whole day."""
         return max(self.information_s, self.way_s, self.required_s)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(curve="k 2")
 class ShortestDay:
     """The shortest day found."""
 
@@ -101,9 +98,6 @@ class ShortestDay:
     bound: DayBound | None = None  # on every day of a class that holds this one; None where it was not computed
     # length of the day asked for, which tells most in it; None where an accuracy was asked for
     most_s: float | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, curve="k 2")
 
     @property
     def note(self) -> str:

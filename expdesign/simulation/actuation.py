@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.signals import Batch, Commands
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Response, Vessel
 
 FOLLOWED = 1.01
@@ -31,7 +31,7 @@ FASTER, COARSEST = 1.5, 0.03
 """Share of a stated rate that a recorded position may move at, and share of its range that its readings may step by."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(means="s 3", end="3")
 class SampleMap:
     """One signal over one sample, linear in its initial value and in the commands that arrive.
 
@@ -48,9 +48,6 @@ class SampleMap:
     # deadband, offset: as in `Response`
     deadband: float
     offset: float
-
-    def __post_init__(self) -> None:
-        seal(self, means="s 3", end="3")
 
 
 def step_shares(responses: Sequence[Response], *, sample_time_s: float, substeps: int) -> Array:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel.vessel import CALM, STEADY, Environment, Variation
 
 __all__ = [
@@ -23,16 +21,13 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(current_to="k 2", wind_to="k 2")
 class WeatherSeries:
     """Current and wind at every sample, held until the next."""
 
     # current_to, wind_to: (k, 2) velocity to north/east [m/s]
     current_to: Array
     wind_to: Array
-
-    def __post_init__(self) -> None:
-        seal(self, current_to="k 2", wind_to="k 2")
 
 
 def draw_environment(forecast: Environment, rng: np.random.Generator) -> Environment:

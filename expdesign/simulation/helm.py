@@ -22,7 +22,7 @@ import scipy
 
 from expdesign.errors import InputError, SpeedOutOfReach
 from expdesign.simulation.actuation import past_deadband
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY, SCALAR, Actuator, Limit, Operators, Vessel
 
 SERVICE_SHARE = 0.85 ** (1 / 3)
@@ -260,7 +260,7 @@ class Helm:
         return [float(a) for a in self.vessel.model.accelerations(motion, motion[:2], given, SCALAR)]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(velocity="3")
 class Approach:
     """A steady run straight ahead in calm water."""
 
@@ -269,9 +269,6 @@ class Approach:
     angle_rad: float  # helm that holds the course; 0 for a symmetric vessel
     starboard: int  # +1 or -1: sign of a change of helm that turns the vessel to starboard, 0 where nothing does
     velocity: Array  # (3,) u, v, r through water, r = 0
-
-    def __post_init__(self) -> None:
-        seal(self, velocity="3")
 
     @property
     def inputs(self) -> Array:

@@ -26,8 +26,6 @@ from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-# The simulated helmsman and engineer: orders that follow the motion, carried out as fast as the actuators allow.
-
 Trial = tuple[Commands, Trajectory]
 LONGEST = 300.0
 """Ship lengths at approach speed after which an unfinished trial ends."""
@@ -175,8 +173,6 @@ class _Sample:
             )
         return state
 
-
-# Standard trials in calm water: turning circle, zig-zag, pull-out, initial turn, stop. The helmsman is simulated.
 
 SIDES = {"starboard": 1, "port": -1}
 MANY = 10_000

@@ -25,7 +25,7 @@ from expdesign.step_trials.responses import (
     fit_second_order,
     preference,
 )
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 STEADY_BLOCKS = 8  # of a plateau, whose means give its standard error
 
@@ -39,7 +39,7 @@ PREFERRED = 10.0  # decrease of Akaike's criterion from which a second order res
 ASTERN = "astern, or begun from astern: left out, as the model is of a vessel that goes ahead"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(state="2", std="2", inputs="m", course="2", density="2")
 class Plateau:
     """Steady state of a hold."""
 
@@ -56,9 +56,6 @@ class Plateau:
     course: Array = field(default_factory=lambda: np.zeros(2))
     samples: int = 0  # of the mean
     density: Array = field(default_factory=lambda: np.zeros(2))  # of the noise: see `mean_errors`
-
-    def __post_init__(self) -> None:
-        seal(self, state="2", std="2", inputs="m", course="2", density="2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -223,8 +223,6 @@ def _correlation_samples(parts: Sequence[Array]) -> float:
     return float(max(1, longest // 2))
 
 
-# When each hold of a record was steady, by the ratio test with thresholds calibrated on the record itself.
-
 LEAST_MEMORY_SAMPLES = 10
 
 

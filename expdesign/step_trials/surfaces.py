@@ -26,7 +26,7 @@ import shapely
 
 from expdesign.step_trials.holds import CHANNELS, CONSTANT_SHARE
 from expdesign.step_trials.samples import STEADY_BLOCKS, Plateau, StepSample
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 # of ridge and lasso that cross-validation compares, on columns of unit size
 PENALTIES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
@@ -37,7 +37,7 @@ SMALLEST = 1e-11
 """Eigenvalue of the normal equations, relative to the largest, below which smaller ones are raised."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(columns="n p", values="n", weights="n", penalised="p")
 class Sampled:
     """Values of a function at places."""
 
@@ -46,9 +46,6 @@ class Sampled:
     weights: Array  # (n,)
     penalised: Array  # (p,) 0 for the intercept, 1 for others
 
-    def __post_init__(self) -> None:
-        seal(self, columns="n p", values="n", weights="n", penalised="p")
-
     def part(self, rows: Array) -> Sampled:
         """Some of the samples."""
         return Sampled(
@@ -56,7 +53,7 @@ class Sampled:
         )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(coefficients="p")
 class Fit:
     """A regression."""
 
@@ -64,9 +61,6 @@ class Fit:
     penalty: float  # that cross-validation chose
     coefficients: Array  # (p,) of the columns as given
     held_out: float  # weighted root mean square error of cross-validation, unit of the values
-
-    def __post_init__(self) -> None:
-        seal(self, coefficients="p")
 
 
 def best_fit(samples: Sampled) -> Fit:
@@ -229,15 +223,12 @@ def _bends(speeds: Array) -> list[tuple[float, float]]:
     return [(steep / width, low + place * width) for steep in STEEPNESS for place in BENDS]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(corners="k 2", scale="2")
 class ValidityRegion:
     """Convex hull of the steady states and transients of a trial, in U and |r|, mirrored to both sides."""
 
     corners: Array  # (k, 2) of the hull, U [m/s] and r [rad/s] divided by `scale`
     scale: Array  # (2,) largest U and |r|
-
-    def __post_init__(self) -> None:
-        seal(self, corners="k 2", scale="2")
 
     @cached_property
     def hull(self) -> shapely.Geometry:
@@ -272,8 +263,6 @@ def validity_region(states: Array) -> ValidityRegion:
     hull = shapely.MultiPoint(mirrored).convex_hull
     return ValidityRegion(corners=shapely.get_coordinates(hull), scale=scale)
 
-
-# Whether port differs from starboard, by nested regressions, and steps up from steps down, by pairs of plateaus.
 
 LOW_ORDER = 3
 """Highest degree of the surface that is compared with."""

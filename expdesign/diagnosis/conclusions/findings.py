@@ -32,8 +32,6 @@ from expdesign.diagnosis.vessel_file import public_name, stated_values
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-# Selected causes as findings: estimates, held-out gains, alternatives, explanations.
-
 CHANGED = "change:time"
 
 
@@ -124,8 +122,6 @@ def error_reductions_of(
     rows = zip(outputs, *(item.tolist() for item in certain_reductions(before, after, seed)), strict=True)
     return tuple(ErrorReduction(output=name, share=share, low=low, high=high) for name, share, low, high in rows)
 
-
-# Notes of a diagnosis: quantities not measured, causes not tested or left out.
 
 FEW = 0.002
 """Share of missing samples that needs no note."""

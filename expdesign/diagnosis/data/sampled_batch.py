@@ -12,8 +12,6 @@ from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
-# Channels that a record measures, and velocities derived from its pose.
-
 
 def has_heading(record: Record) -> bool:
     """Whether every sample has a measured heading."""
@@ -60,9 +58,6 @@ def _differences(batch: Batch) -> tuple[str, ...]:
     jitter = np.median(np.abs(np.diff(rates, 2, axis=0)), axis=0)
     same = (apart < 1e-6 * (jitter + 1e-12)) | (apart < 1e-9)
     return tuple(name for name, found in zip(OUTPUTS, same.tolist(), strict=True) if found)
-
-
-# One measured batch on the comparison grid and the integration grid.
 
 
 def averaging_half_width(rows_per_step: int) -> int:

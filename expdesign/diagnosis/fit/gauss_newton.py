@@ -55,9 +55,6 @@ SHARES_BESIDE_CURRENT = (0.95,)
 NUMBERS_AT_ONCE = 200_000  # in matrices of random currents that are tried together, at most
 
 
-# Noise of the remainder, estimated together with a fit: autoregressions and a random current.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prior:
     """Prior knowledge of the estimated effects."""
@@ -143,9 +140,6 @@ def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: P
     starts = grams.initial_state_steps(effects)
     explained = np.einsum("wc,cwsn->wsn", effects, found.values[: effects.shape[1]])
     return np.asarray(found.error - explained - np.einsum("wn,nwsk->wsk", starts, found.starts))
-
-
-# Gauss-Newton fits of effects, uncertain parameters and noise to all windows.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,8 +17,6 @@ from expdesign.vessel import NUMPY, TERMS, Operators, Response, Term, VesselMode
 from expdesign.vessel.quantities import rows_of
 from expdesign.vessel.structures import FORCE_SIGNALS, FUNCTIONS, MOTION_SIGNALS, Expression, parse_expression
 
-# The terms of an extended model, with their factors and kinds.
-
 Effects = Mapping[str, float]
 AIR_SIGNALS = frozenset({"u_q", "v_q"})
 """Velocity through the air."""
@@ -290,8 +288,6 @@ def is_damping(term: Term, expression: Expression, model: VesselModel) -> bool:
     return not (is_thrust(expression, model) or is_coriolis(term) or AIR_SIGNALS & set(expression.signals))
 
 
-# Terms that may be added to a model, and its own terms of air drag and advance loss.
-
 MORE_TERMS = (
     Term("u", "X_vv", "v*v"),
     Term("u", "X_rr", "r*r"),
@@ -389,8 +385,6 @@ def _readable(term: Term, model: VesselModel) -> bool:
 def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(abs(abs(a @ b) - np.linalg.norm(a) * np.linalg.norm(b)) < 1e-9 * np.linalg.norm(a) * np.linalg.norm(b))
 
-
-# Groups of inputs that share an actuator fault: all, those of one stem, single ones.
 
 RESPONSES = {row.effects[0]: row.key for row in rows_of(Response)}
 """Kind of effect of a group of inputs -> field of `vessel.Response`, in the order in which they act.

@@ -26,9 +26,6 @@ MOST_ROLL_PARTS = 16  # parts of an integrator step for roll
 FARTHEST = 1e3  # state whose rates are taken, at most [m/s, rad/s]
 
 
-# Equations of motion of an extended model.
-
-
 def state_rates(ship: ExtendedModel, state: tuple[Array, ...], exogenous: ExogenousInputs) -> tuple[Array, ...]:
     """d/dt of (u, v, r) or (u, v, r, roll, roll rate)."""
     u, v, r = state[:3]
@@ -108,9 +105,6 @@ def _varying(ship: ExtendedModel, part: ScaledTerm, exogenous: ExogenousInputs) 
 def _heavier(ship: ExtendedModel, exogenous: ExogenousInputs) -> Array | float:
     """Factor of inertia by the depth."""
     return 1 + ship.get("shallow:inertia") * exogenous[SHOAL] if SHOAL in exogenous else 1.0
-
-
-# One integrator step of an extended model, and its derivatives by the state.
 
 
 def runge_kutta_step(

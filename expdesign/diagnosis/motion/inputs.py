@@ -106,8 +106,6 @@ def _response(field: str, value: float) -> Response:
     return Response(**{field: value if field == "offset" else max(value, 0.0)})
 
 
-# Exogenous inputs of an extended model: actuators, water, air, depth and time.
-
 BEGIN, END = "begin ", "end "
 
 

@@ -29,9 +29,6 @@ LARGEST_SPEED = 60.0  # state beyond which a simulation has diverged [m/s, rad/s
 NEWTON_TOLERANCE = 1e-8  # correction below which it has converged
 
 
-# A simulation of all windows, and its linearisation.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
     """A simulation of all windows."""
@@ -95,9 +92,6 @@ class LinearisedMotion:
             forcing=self.forcing[keep],
             path_rates=self.path_rates[:, keep],
         )
-
-
-# Sensor outputs of an extended model.
 
 
 def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading_change: Array | None = None) -> Array:

@@ -40,9 +40,6 @@ FEWEST_WINDOW_SAMPLES = 30  # of shortened windows
 LARGEST_GROWTH = 6.0  # of an error of the initial state within a window
 
 
-# Simulation of all windows at once.
-
-
 def simulate_windows(
     ship: ExtendedModel, windows: Windows, start: Array, *, warm_start: LinearisedMotion | None = None
 ) -> Motion:
@@ -244,9 +241,6 @@ def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
     start = line[:, 0].copy()
     start[:, :3] += (np.linalg.pinv(table) @ missed)[..., 0]
     return start
-
-
-# Window lengths for unstable models: errors of initial states must not grow too much in a window.
 
 
 def stable_windows(ship: ExtendedModel, record: Record) -> Windows:

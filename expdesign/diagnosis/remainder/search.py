@@ -68,9 +68,6 @@ AS_GOOD = 0.8  # share of the likelihood gained by causes from which on a kind o
 LEAST_REDUCTION = 0.05  # share by which the error of some output must fall on held-out data
 
 
-# What remains beside all causes: terms to add to the model, or the kind of what is missing.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Missing:
     """Something that no cause explains and the data surely show."""
@@ -251,8 +248,6 @@ def _name(term: Term, taken: set[str]) -> str:
     name = f"{term.name[0]}_{text}"
     return name if name not in taken else f"{name}_found"
 
-
-# Terms beyond the catalogue added to a selection, as long as they improve the simulation of held-out data.
 
 PARAMETERS = "parameters"
 UNLISTED = "unlisted_term"

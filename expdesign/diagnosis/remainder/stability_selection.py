@@ -142,8 +142,6 @@ def _correlation(A: Array) -> Array:
     return np.asarray(np.abs(A / np.outer(size, size)))
 
 
-# Terms that may be missing in a model beyond the library: products, moduli and cubes of motion and inputs.
-
 LETTERS = {"u": "X", "v": "Y", "r": "N"}
 AHEAD = ("u*u", "u*u*u", "v*v", "r*r", "v*r", "u*v*v", "u*r*r", "u*v*r", "v*v*abs(v)", "r*r*abs(r)")
 ASIDE = (

@@ -28,8 +28,6 @@ from expdesign.vessel import Environment, Response, Roll, Sensors, Vessel, Vesse
 from expdesign.vessel.quantities import effect_row, rows_of
 from expdesign.vessel.structures import SHOAL
 
-# Standard deviations of what a vessel file states of water, air, actuators and sensors: read and written alike.
-
 SEARCHED = ("deadband",)
 """Kinds of effects that are found by trying values; fits have no derivative by them, so their values count as known."""
 
@@ -86,9 +84,6 @@ def _file_keys(key: str, inputs: tuple[str, ...], derived: tuple[str, ...]) -> t
     if kind in RESPONSES:
         return tuple(f"{inputs[column]}_{RESPONSES[kind]}" for column in group_columns(rest, inputs))
     return tuple(row.key for row in rows_of(Sensors) if key in row.effects and row.is_shown(derived))
-
-
-# The extended model of a vessel file and a record.
 
 
 def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
@@ -169,9 +164,6 @@ def _rolled(roll: Roll | None) -> dict[str, float]:
 
 def _shoal(batch: Batch) -> int:
     return batch.input_names.index(SHOAL)
-
-
-# Names and units of effects in results.
 
 
 def stated_values(keys: Iterable[str], ship: ExtendedModel) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting
+from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting, velocity
 from expdesign.errors import InputError
 from expdesign.values import Array
 
@@ -72,9 +72,6 @@ def speed_change(time_s: Array, *, first: float, last: float, share: float) -> A
     return np.stack([surge, 0 * surge, 0 * surge], axis=1)
 
 
-# Acceleration on a straight course.
-
-
 def _reference_acceleration(settings: Mapping[str, float], time_s: Array) -> Array:
     first, last = settings["from_speed_mps"], settings["speed_mps"]
     return speed_change(time_s, first=first, last=last, share=settings["ramp_fraction"])
@@ -85,17 +82,12 @@ ACCELERATION = Family(
     summary="from a lower to a higher surge speed on a straight course",
     settings=(
         DURATION,
-        Setting(name="speed_mps", meaning="surge speed reached", low=-50, high=50, searched="surge"),
-        Setting(
-            name="from_speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50, searched="surge"
-        ),
+        velocity("surge", "speed_mps", "surge speed reached"),
+        velocity("surge", "from_speed_mps", "surge speed at the start", default=0.0),
         RAMP_FRACTION,
     ),
     reference=_reference_acceleration,
 )
-
-
-# Deceleration on a straight course.
 
 
 def _reference_deceleration(settings: Mapping[str, float], time_s: Array) -> Array:
@@ -108,15 +100,12 @@ DECELERATION = Family(
     summary="from a surge speed down to a lower one, or to rest, on a straight course",
     settings=(
         DURATION,
-        Setting(name="speed_mps", meaning="surge speed at the start", low=-50, high=50, searched="surge"),
-        Setting(name="to_speed_mps", meaning="surge speed reached", default=0.0, low=-50, high=50, searched="surge"),
+        velocity("surge", "speed_mps", "surge speed at the start"),
+        velocity("surge", "to_speed_mps", "surge speed reached", default=0.0),
         RAMP_FRACTION,
     ),
     reference=_reference_deceleration,
 )
-
-
-# Inward spiral: a turn that tightens steadily.
 
 
 def _reference_inward_spiral(settings: Mapping[str, float], time_s: Array) -> Array:
@@ -130,22 +119,15 @@ INWARD_SPIRAL = Family(
     summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
     settings=(
         DURATION,
-        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
-        Setting(
-            name="yaw_rate_radps", meaning="yaw rate at the end, positive to starboard", low=-5, high=5, searched="yaw"
-        ),
-        Setting(
-            name="sway_mps", meaning="sway speed, positive to starboard", default=0.0, low=-20, high=20, searched="sway"
-        ),
+        velocity("surge", "speed_mps", "surge speed"),
+        velocity("yaw", "yaw_rate_radps", "yaw rate at the end, positive to starboard"),
+        velocity("sway", "sway_mps", "sway speed, positive to starboard", default=0.0),
         Setting(
             name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4, searched="time"
         ),
     ),
     reference=_reference_inward_spiral,
 )
-
-
-# Multisine: surge, sway and yaw rate each swing with several frequencies at once.
 
 
 def _sum_of_sines(time_s: Array, *, period_s: float, first: int) -> Array:
@@ -169,23 +151,13 @@ MULTISINE = Family(
     settings=(
         WHOLE_PERIODS,
         Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
-        Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
-        Setting(
-            name="speed_swing_mps",
-            meaning="amplitude of surge speed",
-            default=0.0,
-            low=0,
-            high=50,
-            searched="surge",
-        ),
-        Setting(name="sway_mps", meaning="largest sway speed", default=0.0, low=-20, high=20, searched="sway"),
-        Setting(name="yaw_rate_radps", meaning="largest yaw rate", default=0.0, low=-5, high=5, searched="yaw"),
+        velocity("surge", "speed_mps", "mean surge speed"),
+        velocity("surge", "speed_swing_mps", "amplitude of surge speed", default=0.0, signed=False),
+        velocity("sway", "sway_mps", "largest sway speed", default=0.0),
+        velocity("yaw", "yaw_rate_radps", "largest yaw rate", default=0.0),
     ),
     reference=_reference_multisine,
 )
-
-
-# Sway step: sideways motion that starts, stays and ends, on a steady heading.
 
 
 def _reference_sway_step(settings: Mapping[str, float], time_s: Array) -> Array:
@@ -199,9 +171,9 @@ SWAY_STEP = Family(
     summary="a step of sway speed on a steady heading, and back",
     settings=(
         DURATION,
-        Setting(name="sway_mps", meaning="sway speed, positive to starboard", low=-20, high=20, searched="sway"),
+        velocity("sway", "sway_mps", "sway speed, positive to starboard"),
         Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
-        Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),
+        velocity("surge", "speed_mps", "surge speed", default=0.0),
         Setting(
             name="held_fraction",
             meaning="share of the run after which the sway returns to zero",
@@ -215,9 +187,6 @@ SWAY_STEP = Family(
 )
 
 
-# Sway zig-zag: sideways motion to one side and the other on a steady heading.
-
-
 def _reference_sway_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
     wave = flat_wave(time_s, period_s=settings["period_s"])
     surge = np.full_like(time_s, settings["speed_mps"])
@@ -229,21 +198,12 @@ SWAY_ZIGZAG = Family(
     summary="alternating sideways motion on a steady heading, with or without headway",
     settings=(
         WHOLE_PERIODS,
-        Setting(
-            name="sway_mps",
-            meaning="largest sway speed; the first push is to starboard",
-            low=-20,
-            high=20,
-            searched="sway",
-        ),
+        velocity("sway", "sway_mps", "largest sway speed; the first push is to starboard"),
         Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
-        Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),
+        velocity("surge", "speed_mps", "surge speed", default=0.0),
     ),
     reference=_reference_sway_zigzag,
 )
-
-
-# Random telegraph: surge, sway and yaw rate switch between two levels each, independently.
 
 
 def _switching(rng: np.random.Generator, time_s: Array, *, hold_s: float, rise_s: float) -> Array:
@@ -272,31 +232,18 @@ TELEGRAPH = Family(
     summary="random switching of surge speed, sway speed and yaw rate between two levels each",
     settings=(
         DURATION,
-        Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
-        Setting(
-            name="speed_swing_mps",
-            meaning="amplitude of surge speed",
-            low=0,
-            high=50,
-            searched="surge",
-        ),
-        Setting(name="sway_mps", meaning="sway speed to both sides", low=0, high=20, searched="sway"),
-        Setting(name="yaw_rate_radps", meaning="yaw rate to both sides", low=0, high=5, searched="yaw"),
+        velocity("surge", "speed_mps", "mean surge speed"),
+        velocity("surge", "speed_swing_mps", "amplitude of surge speed", signed=False),
+        velocity("sway", "sway_mps", "sway speed to both sides", signed=False),
+        velocity("yaw", "yaw_rate_radps", "yaw rate to both sides", signed=False),
         Setting(name="hold_s", meaning="mean time between switches", low=1e-2, high=1e5, searched="time"),
         Setting(name="rise_s", meaning="time that a switch takes", low=1e-2, high=1e4, searched="time"),
         Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
-        Setting(
-            name="sway_offset_mps", meaning="steady sway added to it", default=0.0, low=-20, high=20, searched="sway"
-        ),
-        Setting(
-            name="yaw_offset_radps", meaning="steady yaw rate added to it", default=0.0, low=-5, high=5, searched="yaw"
-        ),
+        velocity("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
+        velocity("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
     ),
     reference=_reference_telegraph,
 )
-
-
-# Turning circle: a steady turn at a steady surge speed.
 
 
 def _reference_turning_circle(settings: Mapping[str, float], time_s: Array) -> Array:
@@ -310,21 +257,14 @@ TURNING_CIRCLE = Family(
     summary="a turn to one side from a straight approach to a steady yaw rate, drifting outwards",
     settings=(
         DURATION,
-        Setting(name="speed_mps", meaning="approach speed", low=-50, high=50, searched="surge"),
-        Setting(name="turn_speed_mps", meaning="surge speed in the turn", low=-50, high=50, searched="surge"),
-        Setting(
-            name="yaw_rate_radps", meaning="yaw rate in the turn, positive to starboard", low=-5, high=5, searched="yaw"
-        ),
+        velocity("surge", "speed_mps", "approach speed"),
+        velocity("surge", "turn_speed_mps", "surge speed in the turn"),
+        velocity("yaw", "yaw_rate_radps", "yaw rate in the turn, positive to starboard"),
         Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4, searched="time"),
-        Setting(
-            name="sway_mps", meaning="outward sway, positive to port", default=0.0, low=-20, high=20, searched="sway"
-        ),
+        velocity("sway", "sway_mps", "outward sway, positive to port", default=0.0),
     ),
     reference=_reference_turning_circle,
 )
-
-
-# Zig-zag: yaw rate to one side and the other at a steady surge speed.
 
 
 def _reference_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
@@ -340,22 +280,12 @@ ZIGZAG = Family(
     summary="alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns",
     settings=(
         WHOLE_PERIODS,
-        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
-        Setting(
-            name="yaw_rate_radps",
-            meaning="largest yaw rate; the first turn is to starboard",
-            low=-5,
-            high=5,
-            searched="yaw",
-        ),
+        velocity("surge", "speed_mps", "surge speed"),
+        velocity("yaw", "yaw_rate_radps", "largest yaw rate; the first turn is to starboard"),
         Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
-        Setting(name="sway_mps", meaning="largest outward sway speed", default=0.0, low=-20, high=20, searched="sway"),
-        Setting(
-            name="sway_offset_mps", meaning="steady sway added to it", default=0.0, low=-20, high=20, searched="sway"
-        ),
-        Setting(
-            name="yaw_offset_radps", meaning="steady yaw rate added to it", default=0.0, low=-5, high=5, searched="yaw"
-        ),
+        velocity("sway", "sway_mps", "largest outward sway speed", default=0.0),
+        velocity("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
+        velocity("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
     ),
     reference=_reference_zigzag,
 )

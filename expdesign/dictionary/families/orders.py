@@ -81,9 +81,6 @@ def helm_family(
     return orders
 
 
-# Crash stop: engines astern from a steady approach, helm unchanged, until the ship lies still.
-
-
 def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     approach = steady_ahead(vessel, request.settings["speed_mps"])
     time_s, astern = run_times(vessel, request), -request.settings["astern"]
@@ -117,9 +114,6 @@ CRASH_STOP = Family(
     ),
     orders=_orders_crash_stop,
 )
-
-
-# Dieudonne (direct) spiral: the helm goes through steps from one side to the other and back.
 
 
 def _helm_dieudonne_spiral(request: PrimitiveSpec, time_s: Array) -> Array:
@@ -171,9 +165,6 @@ PULL_OUT = Family(
 )
 
 
-# Recorded or hand-made commands, read from a file and repeated as they are.
-
-
 def _orders_recorded(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     recorded, settings = request.commands, request.settings
     if recorded is None:
@@ -204,9 +195,6 @@ RECORDED = Family(
     ),
     orders=_orders_recorded,
 )
-
-
-# Steps: engine order and helm go to random levels, held for random times.
 
 
 def _levels(rng: np.random.Generator, time_s: Array, hold_s: float, count: int) -> Array:
@@ -263,9 +251,6 @@ STEPS = Family(
 )
 
 
-# Turning circle of the standard trials: a given helm, held.
-
-
 def _helm_turning_circle_helm(request: PrimitiveSpec, time_s: Array) -> Array:
     return np.full_like(time_s, request.settings["helm_rad"])
 
@@ -276,9 +261,6 @@ TURNING_CIRCLE_HELM = Family(
     settings=(DURATION, APPROACH, helm_setting("helm, positive to starboard", default=float(np.radians(35.0)))),
     orders=helm_family(_helm_turning_circle_helm),
 )
-
-
-# Zig-zag switched by heading, e.g. 10/10 and 20/20.
 
 
 def _orders_zigzag_heading(vessel: Vessel, request: PrimitiveSpec) -> Excitation:

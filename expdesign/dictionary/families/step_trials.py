@@ -283,8 +283,6 @@ def turn_near(approach: Approach, helm_rad: float, near: Array) -> Array:
     return motion
 
 
-# Rudder steps: the helm goes over in steps and back again, each held, at the approach's engine order.
-
 TRIED = 13
 """Helm angles whose steady turns are computed."""
 
@@ -337,9 +335,6 @@ RUDDER_STEPS = Family(
     ),
     orders=_orders_rudder_steps,
 )
-
-
-# Throttle steps: the engine order goes up in steps and down again, each held, at a helm that is held.
 
 
 def _orders_throttle_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:

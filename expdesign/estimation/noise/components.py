@@ -22,8 +22,6 @@ ROUNDING = 1e-9  # expected periodogram of a part with unit variance below which
 LONG_GAP_SAMPLES = 500  # missing samples in a row after which the noise starts again
 
 
-# Rows of a regression in time: stretches without long gaps, and short gaps filled with zeros.
-
 Turn = NDArray[np.complex128]
 """exp(i psi) of headings psi."""
 Numbers = TypeVar("Numbers", NDArray[np.float64], Turn)

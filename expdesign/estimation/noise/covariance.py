@@ -135,9 +135,6 @@ def _windowed(series: Array, weights: Array) -> Array:
     return np.asarray((spectrum.real.T @ weighted.real + spectrum.imag.T @ weighted.imag) / size)
 
 
-# The covariance of weighted sums of noise that consists of parts, ends of batches included.
-
-
 def score_covariance(
     W: Sequence[Array], residuals: Array, fitted: Sequence[Components], parts: Sequence[Stretch]
 ) -> tuple[list[list[Array]], list[Array]]:

@@ -14,7 +14,7 @@ from expdesign.estimation.regression.polynomial import MOVING, Algebra, Polynomi
 from expdesign.estimation.regression.regression import AIR, Table
 from expdesign.signals import Record
 from expdesign.simulation.motion import rates_over_ground, to_body
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import Expression
 
@@ -204,15 +204,12 @@ STEP_MPS = 1e-4
 """Step of the central difference, which is exact for terms of second order away from a change of sign of a modulus."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(to_mps="2", parameters="p")
 class Guess:
     """What regressors are linearised around."""
 
     to_mps: Array  # (2,) current to north and east [m/s]
     parameters: Array  # (all,) of the model
-
-    def __post_init__(self) -> None:
-        seal(self, to_mps="2", parameters="p")
 
 
 def through_water(table: Table, to_mps: Array) -> Table:

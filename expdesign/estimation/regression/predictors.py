@@ -338,9 +338,6 @@ def mean_between_readings(rows: Array, interpolated: Array) -> Array:
     return result
 
 
-# The rows of a regression, from the batches of a record and the columns of a layout.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rows:
     """Where the rows of a regression come from."""

@@ -23,8 +23,6 @@ BLOCK_SAMPLES = 256  # of a stretch, simulated at once
 SIMULATED_POINTS, BLOCK_POINTS = 1024, 4096  # samples of all stretches, simulated or differentiated at once
 
 
-# Stretches of data that are to be simulated side by side.
-
 INTEGRATORS = {"euler": euler_step, "rk4": rk4_step}
 Called = Callable[..., tuple[Array, ...]]
 """A compiled function of arrays."""

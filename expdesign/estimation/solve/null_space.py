@@ -9,13 +9,12 @@ vectors, so that the sentences stay short.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from expdesign.errors import NotInformative
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 UNSEEN = 1e-10  # relative singular value below which a combination of parameters is not visible in the data
 FAINT = 1e-5  # relative singular value below which least squares gets a warning
@@ -24,16 +23,13 @@ SMALL_WEIGHT = 0.05  # least weight of a parameter that a message names
 NAMED_PARAMETERS = 4  # most parameters of a combination that a message names
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(weights="k")
 class Direction:
     """One combination of parameters."""
 
     parameters: tuple[str, ...]  # names, largest weight first
     weights: Array  # one per name, in units of each parameter's effect on the data; squares sum to about 1
     strength: float  # singular value of the scaled moment matrix along it, relative to the largest of its equation
-
-    def __post_init__(self) -> None:
-        seal(self, weights="k")
 
     def __str__(self) -> str:
         pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[:NAMED_PARAMETERS]
@@ -43,7 +39,7 @@ class Direction:
         return f"{names}: {text.removeprefix('+ ')}{more}" if len(pairs) > 1 else self.parameters[0]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(singular_values="p")
 class NullSpace:
     """The report."""
 
@@ -51,9 +47,6 @@ class NullSpace:
     unseen: tuple[Direction, ...]  # combinations that the data do not show at all
     # combinations so weakly shown that they cannot be told from chance (instruments) or rounding
     faint: tuple[Direction, ...]
-
-    def __post_init__(self) -> None:
-        seal(self, singular_values="p")
 
 
 def null_space(

@@ -14,7 +14,7 @@ from expdesign.estimation.solve.null_space import NullSpace, joined, require_inf
 from expdesign.estimation.solve.sandwich import Uncertainty, covariance_of
 from expdesign.estimation.solve.systems import Part, System, build_part, occupied, split
 from expdesign.estimation.solve.systems import Weighting as Weighting
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 # of the first model, tried one after the other where an estimate is unstable
 MOST_REFINEMENTS = 30  # of simulated instruments
@@ -35,7 +35,7 @@ STABILISING_WEIGHTS = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
 # (1982), 1029-1054.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(values="p", covariance="p p", residuals="k n")
 class Solution:
     """Result of a regression."""
 
@@ -47,9 +47,6 @@ class Solution:
     null_space: NullSpace = field(repr=False)  # what the data cannot see
     warnings: tuple[str, ...] = ()  # one sentence each
     between_runs: Array | float = 0.0  # (p, p) what of the covariance is by how runs differ; 0 where they do not
-
-    def __post_init__(self) -> None:
-        seal(self, values="p", covariance="p p", residuals="k n")
 
 
 def solve_ls(regression: Regression, weighting: Weighting | None = None) -> Solution:

@@ -17,8 +17,6 @@ from expdesign.estimation.regression import MEANS, Integers, Regression, batch_s
 from expdesign.estimation.solve.null_space import NullSpace, null_space
 from expdesign.values import Array
 
-# Options of instrumental variables: their equations, and the noise that their covariance accounts for.
-
 COVARIANCES = ("components", "hac", "kernel", "hc1", "hc0")
 BLOCKS = ("one", "batch")
 

@@ -159,9 +159,6 @@ def _efficiency_entry(item: Efficiencies) -> dict[str, Any]:
     return {"title": item.title, "designs": dict(item.of), "missing": item.missing or None}
 
 
-# A dictionary as a dictionary file, with a CSV of commands for every recorded primitive.
-
-
 def dictionary_files(
     specs: Sequence[PrimitiveSpec], *, name: str, stem: str, comments: Sequence[str] = ()
 ) -> dict[str, str | bytes]:
@@ -221,9 +218,6 @@ def recorded_csv(commands: Commands) -> str:
         for sample, values in enumerate(commands.values.tolist())
     )
     return csv_text(("time_s", *(column_name(name) for name in commands.names)), rows)
-
-
-# A design from labelled, recorded data: its dictionary as dictionary.json, its draws as subsets.json.
 
 
 def recorded_dictionary_json(

@@ -24,8 +24,6 @@ from expdesign.export.files.text import finite, named_finite, strict_json, value
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.vessel import Vessel
 
-# Estimates in words: tables for a terminal, and warnings.
-
 
 def estimate_warnings(found: Assessment, item: Assessed) -> tuple[str, ...]:
     """Warnings for the user of an estimate, one sentence each."""

@@ -23,11 +23,11 @@ from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate, UnderWa
 from expdesign.plan.verify import part_of_track
 from expdesign.shortest_day import AccuracySettings
 from expdesign.simulation.environment import Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Variation, Vessel, column_name
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(nominal="p", before="p", runs="p", track="p", asked="p")
 class PlannedAccuracy:
     """Standard deviations (p,) in the order and the units of the parameters to be estimated."""
 
@@ -37,9 +37,6 @@ class PlannedAccuracy:
     runs: Array  # of estimates from the informative runs alone; nan where they cannot be estimated
     track: Array  # of estimates from the whole track
     asked: Array  # largest that the scenario asks for, nan where it asks for none
-
-    def __post_init__(self) -> None:
-        seal(self, nominal="p", before="p", runs="p", track="p", asked="p")
 
 
 def planned_accuracy(
@@ -351,7 +348,7 @@ class Purchase:
     without: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(pose="3", before="p", now="p", stated="p", so_far="p", after="p")
 class Known:
     """The state of a trial in progress."""
 
@@ -374,9 +371,6 @@ class Known:
     after: Array  # (p,) likewise from these data and the rest together
     purchases: tuple[Purchase, ...]  # (p,) most informative runs
     under_way: UnderWay | None = None  # how the ship moves as the rest begins; None where it is assumed to be stopped
-
-    def __post_init__(self) -> None:
-        seal(self, pose="3", before="p", now="p", stated="p", so_far="p", after="p")
 
     @property
     def new(self) -> tuple[str, ...]:

@@ -61,8 +61,6 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-# Measured batches as one CSV file of the kind that `records.load_records` reads.
-
 GAP_SAMPLES = 10
 """Gap between the times of two batches, in samples."""
 

@@ -48,8 +48,6 @@ FOOTPRINT_SEED = 0  # random seed of the footprint figure; the planner uses othe
 FOOTPRINT_PIECES = 40  # places of the hull along a run that its drawn footprint is made of
 
 
-# Latitude and longitude along the edges of the chart, a scale bar, and north.
-
 STEPS = (1.0, 2.0, 5.0, 10.0)
 
 

@@ -15,8 +15,6 @@ from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
-# The procedure on board, and the result of its Monte Carlo simulation: shared by the report and the run cards.
-
 
 def procedure_sentences(plan: Plan) -> list[str]:
     """The steps between runs, one text each; none where no Monte Carlo trials were simulated."""

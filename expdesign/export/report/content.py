@@ -16,11 +16,11 @@ from expdesign.information.moments import PrimitiveInformation, over_shares
 from expdesign.plan.values import Plan
 from expdesign.shortest_day import AccuracySettings, ShortestDay
 from expdesign.simulation.environment import Environment
-from expdesign.values import Array, readonly, seal
+from expdesign.values import Array, readonly, sealed
 from expdesign.vessel import Vessel
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(start="3", goal="3")
 class ReportContent:
     """The values that the report shows."""
 
@@ -45,9 +45,6 @@ class ReportContent:
     day: ShortestDay | None = None  # how the day was found to be the shortest, or None where total_s decides
     asked: AccuracySettings | None = None  # the accuracy that the scenario asks for
     remarks: tuple[str, ...] = ()  # what the files state and the trial does not use, or takes as certain; one line each
-
-    def __post_init__(self) -> None:
-        seal(self, start="3", goal="3")
 
     @cached_property
     def _names(self) -> dict[str, str]:

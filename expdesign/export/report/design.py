@@ -19,8 +19,6 @@ from expdesign.growing import GrowRound, Growth
 from expdesign.sea_area import LocalFrame
 from expdesign.shortest_day import ShortestDay
 
-# Parameters: expected standard deviations before and after the trial, and their table.
-
 
 def parameter_rows(content: ReportContent, found: PlannedAccuracy) -> list[tuple[str, ...]]:
     """By parameter: name, term, value, standard deviation before, after the runs, after the track, and their ratio."""
@@ -96,9 +94,6 @@ def measures_velocity(content: ReportContent) -> bool:
     """Whether the vessel file states noise to propagate."""
     sensors = content.vessel.sensors
     return sensors.velocity_mps > 0 or sensors.yaw_rate_radps > 0
-
-
-# The section of the report on a trial in progress: what is known, and what the rest of the trial adds.
 
 
 def known_rows(known: Known) -> list[tuple[str, ...]]:
@@ -183,9 +178,6 @@ def _gain(known: Known) -> str:
     )
 
 
-# The criterion of the design, its certificate, and the efficiency under other criteria.
-
-
 NAMES = {"continuous": "optimal allocation", "repeats": "whole runs", "uniform": "equal time"}
 
 
@@ -265,9 +257,6 @@ def short_of_optimum(content: ReportContent) -> str:
     return f"{100 * math.ceil(gain / power) * power:.10f}".rstrip("0").rstrip(".") + f"{words.NB}%"
 
 
-# The steps from the mathematical optimum to the route file: the loss and the proof at each step.
-
-
 Link = tuple[str, str, str]
 """One step: its name, its result, and the method behind the number."""
 
@@ -342,9 +331,6 @@ def _route_links(content: ReportContent) -> list[Link]:
 
 def _length(length_m: float) -> str:
     return "less than 1 mm" if length_m < 1e-3 else f"{1000 * length_m:.0f} mm"
-
-
-# Manoeuvres that a search added to the dictionary, and the gain of each.
 
 
 def growth_rows(growth: Growth, shown: Callable[[str], str]) -> list[tuple[str, ...]]:

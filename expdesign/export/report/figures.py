@@ -41,9 +41,6 @@ HULLS = 5  # hulls drawn along the path of a primitive
 NUMBER_GAP = 0.022  # least distance of the numbers of runs, as a share of the figure's width
 
 
-# Durations with the equivalence theorem, information of each primitive, time against accuracy, standard errors.
-
-
 @page_figure
 def durations_figure(content: ReportContent) -> str:
     """Left: time of each primitive, optimal and in whole runs. Right: its sensitivity against the bound."""
@@ -183,9 +180,6 @@ def parameter_size(content: ReportContent) -> Array:
     return np.where(values > 0, values, np.where(prior > 0, prior, 1.0))
 
 
-# The whole plan over time: speed, yaw rate, commands, with the informative runs shaded.
-
-
 GROUPS = {
     "n": ("propeller speed [rev/s]", 1.0),
     "a": ("azimuth angle [\N{DEGREE SIGN}]", float(np.degrees(1.0))),
@@ -284,8 +278,6 @@ def _number_runs(axes: Axes, plan: Plan) -> None:
             textcoords="offset points", ha="center", fontsize=9, fontweight="bold", color=PRIMITIVE,
         )  # fmt: skip
 
-
-# One figure for each primitive: its path and its velocities.
 
 LEAST_SPAN = {"u [m/s]": 0.2, "v [m/s]": 0.2, "r [\N{DEGREE SIGN}/s]": 0.2}
 """Axes show at least this much, so that rounding errors do not look like motion."""

@@ -33,9 +33,6 @@ NEAR_COST = 50.0  # of two waypoints that are too near to each other, in legs
 DRY_COST = 1000.0  # of a corridor that leaves the water, in legs
 
 
-# Cutting a curved track into straight chords.
-
-
 def cut_into_chords(
     points: Array, *, boundaries: Sequence[int], tolerance_m: float, water: shapely.MultiPolygon | None
 ) -> list[int]:
@@ -130,8 +127,6 @@ def merge_standing(
     return groups
 
 
-# The corridor of a leg: how far to port and to starboard of a straight line the ship may be.
-
 Sides = tuple[float, float]
 """Widths to port and to starboard [m]."""
 
@@ -209,8 +204,6 @@ def widened(
         sides[index] = low
     return sides[0], sides[1]
 
-
-# Few waypoints for the bridge: which samples of the track they stand at.
 
 Stop = tuple[int, int]
 """Samples of arrival and departure; the waypoint is where the ship is on arrival."""

@@ -25,8 +25,6 @@ from expdesign.simulation.environment import Environment
 from expdesign.values import Array
 from expdesign.vessel import Variation, Vessel, column_name
 
-# The entries of plan.json that routes and simulated trials need, with their types and ranges.
-
 
 class _Vessel(Entry):
     name: str
@@ -126,9 +124,6 @@ def environment_of(file: _Environment) -> Environment:
         wind_variation=Variation(std_mps=wind.variation_std_mps, correlation_s=wind.correlation_s),
         sea_state=file.sea_state,
     )
-
-
-# A verified plan as its files hold it: input of routes and of simulated trials.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -94,9 +94,6 @@ def _holds(fence: Fence, water: shapely.Geometry, line: shapely.LineString, fram
 COMPARED_POINTS = 17  # points on each leg where a route is compared with the track
 
 
-# How well a route of waypoints fits the track: exact distances after rounding to file decimals.
-
-
 @dataclass(frozen=True, kw_only=True)
 class RouteFit:
     """Accuracy of a route."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -11,14 +10,14 @@ from numpy.typing import NDArray
 
 from expdesign.monitoring.yaw.model import YawData, YawModel
 from expdesign.simulation.motion import State, rk4_step
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 SEARCH_STEPS = 25
 LARGEST_RATE = 10.0
 """Yaw rates of a simulation are held within this [rad/s]: a poor model of an unstable ship runs away."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(parameters="n p", std="n p", fit="n")
 class YawEstimate:
     """Estimates from n voyages."""
 
@@ -26,9 +25,6 @@ class YawEstimate:
     parameters: Array  # (n, p) SI
     std: Array  # (n, p) standard errors from the residual, as if it were white; noise of the inputs is not counted
     fit: Array  # (n,) 100 (1 - |r - r_hat| / |r - mean r|) [%]
-
-    def __post_init__(self) -> None:
-        seal(self, parameters="n p", std="n p", fit="n")
 
     def of(self, name: str) -> Array:
         """(n,) estimates of one parameter."""

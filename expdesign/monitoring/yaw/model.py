@@ -107,8 +107,6 @@ def term_budget(model: YawModel, data: YawData, parameters: Mapping[str, float])
     return {name: parameters[name] * values[..., place] for place, name in enumerate(model.parameters[1:])}
 
 
-# Measured data of a ship as the inputs of a yaw model.
-
 MOMENT = "actuator_psi_nm"
 SIDE = ("sway_acceleration_mps2", "lateral_acceleration_mps2")
 SAMPLES = 250

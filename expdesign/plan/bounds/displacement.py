@@ -14,7 +14,7 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.control import over_ground
 from expdesign.plan.runs import run_at_headings
 from expdesign.simulation import Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 TRACK_SIDES = 24  # of the polygon that contains a track
@@ -34,15 +34,12 @@ class Displacement:
     deviation_m: float  # no point of the chord is farther than this from the path [m]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(current_to="2")
 class Headway:
     """The fastest leg."""
 
     speed_mps: float  # through water
     current_to: Array  # (2,) of the water [m/s], slower than that
-
-    def __post_init__(self) -> None:
-        seal(self, current_to="2")
 
     @property
     def current_mps(self) -> float:
@@ -147,8 +144,6 @@ def _deviation_m(track: Array) -> float:
     apart = shapely.distance(shapely.points(points), shapely.linestrings(track))
     return float(apart.max()) + float(np.hypot(*(track[-1] - track[0]))) / 400
 
-
-# The track of a run over ground, as branch and bound places it.
 
 SIDES = np.stack([np.cos(angle := np.arange(TRACK_SIDES) * 2 * np.pi / TRACK_SIDES), np.sin(angle)], axis=1)
 """Normals of the sides of a polygon that contains a track."""

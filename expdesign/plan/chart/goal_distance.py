@@ -14,7 +14,7 @@ import shapely
 
 from expdesign.plan.chart.visibility_graph import VisibilityGraph
 from expdesign.sea_area import SeaArea, as_multipolygon
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 GRID_CELLS = 3_000_000  # of the clearance grid at most; a larger area gets a coarser grid
 FINE_HULLS = 0.25  # spacing of that grid in hull lengths above which a smaller part of the chart is planned in
@@ -24,16 +24,13 @@ ROUTING_CELLS = 400_000  # of the grid on which the narrowest passage is located
 KEPT_GRIDS = 3  # visibility graphs, clearance grids and tables of distances that a process keeps
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(origin="2", clearance_m="r c")
 class ClearanceField:
     """Distance to forbidden water on a grid."""
 
     origin: Array  # (2,) north, east of the first cell's centre [m]
     cell_m: float  # grid spacing [m]
     clearance_m: Array  # (rows north, columns east) distance from the cell's centre to anything forbidden [m]
-
-    def __post_init__(self) -> None:
-        seal(self, origin="2", clearance_m="r c")
 
     @property
     def error_m(self) -> float:
@@ -163,9 +160,6 @@ def _neighbours(numbers: np.ndarray, step_row: int, step_column: int) -> tuple[n
     a = numbers[: rows - step_row, low:high]
     b = numbers[step_row:, low + step_column : high + step_column]
     return a.ravel(), b.ravel()
-
-
-# The part of a chart that a trial can reach, so that planning does not depend on how much chart surrounds it.
 
 
 def reachable(area: SeaArea, ends: Array, reach_m: float) -> SeaArea:

@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.memory import recalled
 from expdesign.simulation import Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY, Vessel
 
 SPEED_BANDS = 12  # with a largest acceleration each
@@ -24,7 +24,7 @@ RATE_MARGIN = 1.1  # factor on the largest rates found, for what the search may 
 LOSS_STEP, LOSS_STEPS = 0.01, 3000
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(edges_mps="e", until_s="s", faster_mps2="s k", slower_mps2="s k")
 class SpeedChanges:
     """Largest rates of change of speed after commands that stood, or before commands that will."""
 
@@ -33,9 +33,6 @@ class SpeedChanges:
     # faster_mps2, slower_mps2: (s, k) largest rates, both positive
     faster_mps2: Array
     slower_mps2: Array
-
-    def __post_init__(self) -> None:
-        seal(self, edges_mps="e", until_s="s", faster_mps2="s k", slower_mps2="s k")
 
     @property
     def mean_mps2(self) -> float:

@@ -85,8 +85,6 @@ class ForceController:
         return Allocator(self.vessel.model, sample_time_s=self.vessel.sample_time_s)
 
 
-# The controller of helm-steered ships: helm and engine orders, for many ships at once.
-
 ORDERS = np.linspace(-1.0, 1.0, 9)
 """Engine orders compared."""
 KICKS = np.linspace(0.0, 1.0, 9)

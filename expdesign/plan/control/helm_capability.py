@@ -30,9 +30,6 @@ STEADY_SHARE = 1e-6  # of the approach speed, per time of a hull length, that a 
 STEADY_OFFSET = 0.3  # shares of the approach's scales between the exact turn and the end of its simulation
 
 
-# Steady turns of a ship that is steered by a helm: what is left when the helm stays over, by simulation.
-
-
 @dataclass(frozen=True, kw_only=True)
 class SteadyTurn:
     """A turn in which nothing accelerates, in calm water and air."""

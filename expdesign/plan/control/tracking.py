@@ -16,7 +16,7 @@ import numpy as np
 from expdesign.plan.control.controllers import Controller, Demand
 from expdesign.plan.control.ships import LEAD_SHARE, TRACK_LEAD, Capability
 from expdesign.simulation import Environment
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Allocator, Vessel, VesselModel
 
 CATCH_UP = 0.3  # largest speed towards the reference, in transit speeds
@@ -25,14 +25,11 @@ PACE_LEAST, PACE_MOST = 0.2, 3.0  # of a reference that stays abeam of a ship, i
 LEARNING = 3.0  # time constant in which an unexplained acceleration is estimated, in those of the velocities
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(states="k 6")
 class Reference:
     """What is to be followed."""
 
     states: Array  # (k + 1, 6) pose and velocity over ground at every sample
-
-    def __post_init__(self) -> None:
-        seal(self, states="k 6")
 
     def at(self, sample: Array) -> Array:
         """(n, 6) reference at fractional samples (n,)."""

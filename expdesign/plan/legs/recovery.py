@@ -6,13 +6,12 @@ The engines go to transit speed; when she no longer goes astern, counter helm en
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.plan.control import Capability, HelmShip
 from expdesign.plan.legs.water import LegWater, nearest_turns, through_water
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import within_limits
 
 STRAIGHT_OFF_HULLS = 1.0  # straight before the first turn, as the helm takes that long to act
@@ -26,15 +25,12 @@ STERNWAY_SHARE = 0.05  # transit speeds astern from which on a ship is brought t
 STOPPING_HULLS = 40.0  # hull lengths at transit speed in whose time, at most
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(states="n 6", commands="k m")
 class Recovery:
     """From a state until the ship goes straight ahead, or stands."""
 
     states: Array  # (k + 1, 6) at every sample
     commands: Array  # (k, m)
-
-    def __post_init__(self) -> None:
-        seal(self, states="n 6", commands="k m")
 
 
 def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recovery:

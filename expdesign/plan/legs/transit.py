@@ -7,14 +7,12 @@ unstable on her course or wind turns her, is steered along by the helmsman, and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from expdesign.plan.control import HelmShip, Helmsman, over_ground
 from expdesign.plan.legs.water import ARRIVAL, LegTask, LegWater
 from expdesign.simulation import to_body
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY
 
 TRANSIT_HULLS = 20.0  # shortest straight that is not optimised, in hull lengths
@@ -24,7 +22,7 @@ HEADING_ROUNDS = 8  # of the search for the heading that makes good a course in 
 ASTRAY_HULLS = 1.0  # farthest from the straight that a helmsman may end, in hull lengths
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(to="i 3", start="6", on="j 3")
 class Transit:
     """A long straight of a leg's path."""
 
@@ -33,9 +31,6 @@ class Transit:
     count: int  # samples that it takes
     sample_time_s: float  # of them
     on: Array  # (j, 3) places and courses of the path after it
-
-    def __post_init__(self) -> None:
-        seal(self, to="i 3", start="6", on="j 3")
 
     def held(self, task: LegTask, before: Array, water: LegWater, ship: HelmShip) -> tuple[Array, Array] | None:
         """Commands (k, m) of the straight after those of the leg before it (b, m), and the state (6,) at its end.

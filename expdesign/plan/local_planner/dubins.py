@@ -34,9 +34,6 @@ from expdesign.values import Array
 PATH_STRETCHES = (5.0, 12.0, 25.0, 50.0, 100.0)
 
 
-# Lengths of the shortest curves of bounded curvature, many at once: what a search needs of them.
-
-
 def dubins_m(start: Array, end: Array, *, radius_m: float) -> Array:
     """(...,) lengths of the shortest Dubins curves between poses (..., 3) and (..., 3), obstacles ignored [m]."""
     step = (end[..., :2] - start[..., :2]) / radius_m

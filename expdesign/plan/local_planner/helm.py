@@ -8,7 +8,7 @@ curve, and goes straight for the last hull length before a run.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -48,7 +48,7 @@ from expdesign.plan.local_planner.protocol import (
     TransitionTrials,
 )
 from expdesign.simulation import CALM
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 # what a metre costs that a helm-steered leg is too short by, in metres at transit speed: the ship goes back for it,
 # slowly
@@ -62,7 +62,7 @@ STOPPED_SHARE = 0.3  # of transit speed below which a ship has stopped or is abo
 # A rule for the time of legs of helm-steered ships: accelerate, go on, stop, as the ship's own simulation does.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(speeding_up="g 3", stopping="s 3")
 class HelmTimes:
     """What the rule needs."""
 
@@ -77,9 +77,6 @@ class HelmTimes:
     answer_s: float  # until a new engine order takes effect
     speeding_up: Array  # (k, 3) speed m/s, distance m and time s from rest with the engines full ahead
     stopping: Array  # (k, 3) the same until rest with the engines full astern, counted backwards
-
-    def __post_init__(self) -> None:
-        seal(self, speeding_up="g 3", stopping="s 3")
 
     def seconds(self, length_m: Array, exit_mps: float, entry_mps: float) -> Array:
         """(...,) time of legs of such lengths through water from one speed to another [s]."""
@@ -185,7 +182,7 @@ def _table(speed: Array, step_s: float, top_mps: float) -> Array:
     return np.column_stack([most, path_m, step_s * np.arange(count)])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(recoveries="q 4")
 class HelmPlanner:
     """Legs recover from the run before, turn on Dubins curves, and end with a straight run-up."""
 
@@ -193,9 +190,6 @@ class HelmPlanner:
     # (q, 4) displacement by which the ship recovers from each run before its first turn: ahead m, to starboard m,
     # course from the heading at the run's end rad, time s
     recoveries: Array
-
-    def __post_init__(self) -> None:
-        seal(self, recoveries="q 4")
 
     @cached_property
     def times(self) -> HelmTimes:

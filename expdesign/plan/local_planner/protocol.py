@@ -21,7 +21,7 @@ from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement, WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.sea_area import LocalFrame
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 DRIFT_ROUNDS = 3  # rounds in which the time of a leg and the drift in that time are made to agree
@@ -65,7 +65,7 @@ class GoAroundTime:
         return np.asarray(self.soon_s * np.exp(-np.asarray(leg_s) / self.settled_s))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(current_to="2")
 class RunSpace:
     """Where runs may be placed, whatever leads to them."""
 
@@ -74,9 +74,6 @@ class RunSpace:
     field: ClearanceField  # clearance
     leg_margin_m: float  # clearance that leg centre lines need on the grid [m]
     current_to: Array  # (2,) mean current [m/s]
-
-    def __post_init__(self) -> None:
-        seal(self, current_to="2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,7 +85,7 @@ class Departure:
     last: int = -1  # index of the run that ends there, or -1
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(goal="3", current_to="2", refused="b 3")
 class SearchSpace:
     """Data of the search for places and orders."""
 
@@ -109,9 +106,6 @@ class SearchSpace:
     go_around: GoAroundTime | None = None  # expected time of go-arounds, where plans are compared by it too
     # (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
-
-    def __post_init__(self) -> None:
-        seal(self, goal="3", current_to="2", refused="b 3")
 
     @property
     def ship(self) -> Capability:

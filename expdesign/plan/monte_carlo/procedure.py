@@ -26,7 +26,7 @@ from expdesign.conventions import wrap_angle
 from expdesign.dictionary.trim import drift
 from expdesign.plan.control import RUN_UP_TIME_CONSTANTS, TRACK_LEAD, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 
 HEADING_RAD = radians(3.0)  # tolerance of a run's start heading
@@ -115,15 +115,12 @@ def speed_decay_s(vessel: Vessel, speed_mps: float) -> float:
     return 1.0 / damping if damping > 0 else np.inf
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(states="k 6")
 class Stretch:
     """A reference that leads to the start of a run, and a little past it."""
 
     states: Array  # (k + 1, 6) sample by sample
     arrival: int  # row of the planned start
-
-    def __post_init__(self) -> None:
-        seal(self, states="k 6")
 
 
 def planned_stretch(helm: Helmsman, track: Array, after_m: float) -> Stretch:

@@ -186,9 +186,6 @@ class PathFollowers:
         return np.minimum(np.sqrt(bend_mps * bend_mps + 2 * brake * braked_m), self._helm.ship.transit_speed_mps)
 
 
-# Go-around paths of ships that sail arcs: from wherever they are to the beginning of a run-up.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GoAroundPaths:
     """Paths to a pose."""

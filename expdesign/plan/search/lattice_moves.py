@@ -27,8 +27,6 @@ LATTICE_POINTS = 8  # places looked at along a move
 LATTICE_LEAST_SPEED = 0.1  # over ground against a current, in transit speeds
 
 
-# The poses of a state lattice over a sea area: cells and headings, and which of them legs may pass.
-
 AHEAD = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
 """Cells north and east that lie ahead, by heading."""
 

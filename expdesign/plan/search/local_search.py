@@ -17,7 +17,7 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import sight_lines
 from expdesign.plan.local_planner import Departure, LegEnds, Pair, RunSpace, SearchSpace, Successors, arc_end, run_ends
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 MANY_RUNS, SPARSE_DISCS = 50, 8  # of more runs than this, every so manieth disc is looked at before all of them
 SHIFT_HULLS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # steps of the local search, and with each a turn
@@ -28,9 +28,6 @@ SWEEPS = 20  # over all blocks of runs at most
 SAME = 1e-3  # hull lengths and radians by which a leg may differ from a transition that was tried
 EQUAL = 6  # decimals to which times [s] are compared, so that rounding does not choose between mirror images
 LEAST_GAIN_S = 0.05  # for which a block is moved
-
-
-# Whether successors of partial plans keep their clearances on the grid.
 
 
 def clear_successors(space: SearchSpace, found: Successors, *, closed: bool = False) -> np.ndarray:
@@ -137,16 +134,13 @@ class Chain:
         return tuple(part.tobytes() for part in near)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(poses="n 3")
 class Polished:
     """Better poses for the same runs in the same order."""
 
     poses: Array  # (n, 3) where runs begin
     seconds: float  # time of all legs by the rule
     moves: int  # blocks of runs for which better places were sought
-
-    def __post_init__(self) -> None:
-        seal(self, poses="n 3")
 
 
 def polished(space: SearchSpace, departure: Departure, runs: Sequence[int], poses: Array) -> Polished:

@@ -43,9 +43,6 @@ def placed_runs(
     return placed_on_lattice(space, repeats, departure, spacing_m=settings.lattice_spacing_m, progress=progress)
 
 
-# The lattice planner: order and placement of the runs by the exact search on a state lattice, with its proof.
-
-
 def placed_on_lattice(
     space: SearchSpace,
     repeats: Sequence[int],

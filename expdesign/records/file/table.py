@@ -243,8 +243,6 @@ def _cuts(table: Table, missing: Mapping[str, Mask], first: int, last: int) -> I
             yield f"cut {rows} at the {place}, where {', '.join(names)} {'is' if len(names) == 1 else 'are'} missing"
 
 
-# Relative wind in the b-frame, from a Cartesian anemometer or a vane.
-
 CARTESIAN = ("wind_u_mps", "wind_v_mps")
 VANE = ("wind_speed_mps", "wind_angle_rad")
 

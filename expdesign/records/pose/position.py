@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from expdesign.conventions import whole_turns
 from expdesign.errors import FileError
 from expdesign.records.file import Table, check_ranges, input_name, is_turning_input, read_table
 from expdesign.sea_area import LocalFrame
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Limit
 
 JUMP_RATIO = 10.0  # a step above this multiple of the 95th percentile of all changes gets a note
@@ -130,10 +130,7 @@ def _steps(values: Array, batches: tuple[slice, ...]) -> Array:
     return steps
 
 
-# The last fix of a file: where the ship was when the data end.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(position="2")
 class Fix:
     """A measured position and heading."""
 
@@ -142,9 +139,6 @@ class Fix:
     degrees: bool  # whether the position is in degrees of latitude and longitude, or in metres north and east
     position: Array  # (2,) latitude, longitude [deg] or north, east [m]
     heading_rad: float  # clockwise from north
-
-    def __post_init__(self) -> None:
-        seal(self, position="2")
 
 
 def last_fix(path: Path) -> Fix:

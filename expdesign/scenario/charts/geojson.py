@@ -29,8 +29,6 @@ from expdesign.values import Array
 AREA_ROUNDING_DEG2 = 1e-13  # area of rounding, for outlines of about one degree; a tenth of a square decimetre
 
 
-# From GeoJSON files to features and the rings of their polygons; geometry is not checked here.
-
 UNNAMED = ""
 """Layer of features that name none."""
 POLYGON_TYPES = ("Polygon", "MultiPolygon", "GeometryCollection")
@@ -231,8 +229,6 @@ def _properties(row: object) -> Mapping[str, Any]:
 def _named(path: Path, number: int, layer: str) -> Entry:
     return Entry(path, f"feature {number} (layer {shown(layer)})" if layer else f"feature {number}")
 
-
-# Charts: the polygons of GeoJSON layers in degrees, every one checked.
 
 REPEATED = "repeated point", "removed"
 CLOSED = "ring", "closed"

@@ -193,8 +193,6 @@ def _counted(repaired: list[str]) -> tuple[str, ...]:
     return (f"{len(repaired)} outlines that touch or cross themselves taken apart",) if repaired else ()
 
 
-# Allowed water of an S-57 cell: deep enough, clear of solid objects, dangers and restricted areas.
-
 GEOJSON_ONLY = (
     *("outlines", "land_layers", "water_layers", "layer_property", "depth_layers", "depth_property", "depth_positive"),
     *("skip_features", "danger_layers"),

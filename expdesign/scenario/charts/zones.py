@@ -128,8 +128,6 @@ class AreaTable(Table):
 LARGEST_EXTENT_KM = 250.0  # of a sea area, so that a local frame holds it
 
 
-# Chart geometry in degrees: to the metres of a local frame, and where it lies beside the bounds.
-
 STEP_DEG = 0.005
 """Chart edges are straight in latitude and longitude; cut into pieces this long they are straight in the frame too,
 to a centimetre."""

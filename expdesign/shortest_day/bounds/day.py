@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +17,7 @@ from expdesign.shortest_day.bounds.motions import AFFINE, Affine, Motions, over_
 from expdesign.shortest_day.prices import fewest_runs
 from expdesign.shortest_day.values import DayBound
 from expdesign.simulation import to_body
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY
 
 SPEEDS = 24  # ranges of speed whose gain and loss are bounded
@@ -38,7 +37,7 @@ SLOW_START = 0.01  # share of the way's time that gaining speed must take for th
 # combined here with `affine`.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(edges="n", gain="k", loss="k")
 class SpeedChanges:
     """How fast speed through water can change."""
 
@@ -46,9 +45,6 @@ class SpeedChanges:
     # gain, loss: (k,) most in each range [m/s2]; not positive where the speed cannot be passed
     gain: Array
     loss: Array
-
-    def __post_init__(self) -> None:
-        seal(self, edges="n", gain="k", loss="k")
 
     def least_s(self, way_m: float, begin_mps: float) -> float:
         """Least time of a way that begins with a speed and ends at rest [s]; 0 where it is too short to stop on."""

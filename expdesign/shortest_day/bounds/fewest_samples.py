@@ -25,7 +25,7 @@ from scipy.optimize import linprog
 from expdesign.errors import InputError
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds.motions import Motions
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 
 ROUNDS = 40  # of adding samples to a measure
 
@@ -60,16 +60,13 @@ SEARCHES = 5  # for the sample that tells most, each with a better measure
 Indices = NDArray[np.intp]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(points="c d")
 class Richest:
     """The largest <G, B(x)>."""
 
     found: float  # of a sample found
     bound: float  # no sample of the class has more
     points: Array  # (c, d) samples of which some have the most, and `found` is the best
-
-    def __post_init__(self) -> None:
-        seal(self, points="c d")
 
 
 def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = BOXES) -> Richest:
@@ -192,7 +189,7 @@ def _halved(boxes: _Boxes, order: Indices, whole: Array) -> tuple[Array, Array]:
     return np.concatenate([centres - step, centres + step]), np.tile(halves, (2, 1))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(multiplier="k k")
 class SampleBound:
     """The fewest samples that reach an accuracy."""
 
@@ -201,9 +198,6 @@ class SampleBound:
     enough: float  # samples that a measure over the class needs, whether a motion can follow it or not
     # (k, k) G for the columns of `Motions.rows`: the information of all that is accurate enough has <G, M> >= 1
     multiplier: Array
-
-    def __post_init__(self) -> None:
-        seal(self, multiplier="k k")
 
 
 def fewest_samples(

@@ -15,7 +15,7 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.simulation import to_body
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import NUMPY, Actuator, Operators, VesselModel, direct_terms, force_matrix, stem
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
@@ -114,7 +114,7 @@ VELOCITIES = ("u", "v", "r")
 AIR = ("u_q", "v_q")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(low="d", high="d", air_to="2", forces="f 3")
 class Motions:
     """All motions of a model within limits.
 
@@ -130,9 +130,6 @@ class Motions:
     high: Array
     air_to: Array  # (2,) mean wind less mean current, north and east [m/s]
     forces: Array  # (f, 3) corners of a polytope of generalised forces; one of zeros where inputs are in the point
-
-    def __post_init__(self) -> None:
-        seal(self, low="d", high="d", air_to="2", forces="f 3")
 
     @staticmethod
     def within(model: VesselModel, parameters: Sequence[str], velocities: Array, *, air_to: Array) -> Motions:

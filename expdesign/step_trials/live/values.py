@@ -94,9 +94,6 @@ class Event:
     following: tuple[Inputs, Listed | None] | None = None
 
 
-# A trial that is being sailed out of its file, to the last bit.
-
-
 def restored_state(table: Mapping[str, Any]) -> State:
     """A state, read from plain values.
 

@@ -373,8 +373,6 @@ def _following(state: State, setup: Setup) -> tuple[Inputs, Listed | None] | Non
     return next(iter(in_sequence(state.left, at, setup.steps)), None)
 
 
-# How fast the vessel is expected to answer, by the model that is guessed before the trial.
-
 PART_S = 20.0
 """Simulated at a time [s], for a vessel of 1 m; with the square root of the length, as Froude's law has it."""
 MOST_PARTS = 8

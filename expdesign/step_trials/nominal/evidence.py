@@ -113,8 +113,6 @@ def _change(one: StepSample) -> float:
     return float((one.plateau.state - one.before.state)[one.hold.channel or 0])
 
 
-# Distances of a vessel model from what the steps say, in standard errors.
-
 HALVINGS = 24
 DRIFT, MOST_DRIFT = 0.999, 0.99
 """Sine of the largest drift angle that is sought, and from which there counts as none."""

@@ -31,8 +31,6 @@ from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel, with_response_values
 
-# The parameters that what the steps say leaves most likely, with their covariance.
-
 MOST_STEPS = 60
 """Largest number of Gauss-Newton steps between two enlargements of errors."""
 TIMES = 4

@@ -21,8 +21,6 @@ from expdesign.export.routes import ROUTE_NAME, build_bridge_route, build_route,
 from expdesign.progress import Progress, silent
 from expdesign.workflows.outcome import Outcome, finished, workflow
 
-# `expdesign export`: route files of a plan made before.
-
 
 @workflow
 def export(request: requests.Export, *, progress: Progress = silent) -> Outcome:
@@ -67,9 +65,6 @@ def _departure(text: str | None) -> datetime | None:
         return datetime.fromisoformat(text)
     except ValueError:
         raise InputError(f"--departure is {text!r}, expected a time such as 2026-05-01T08:00:00Z") from None
-
-
-# `expdesign check-route`: route files of any origin checked.
 
 
 @workflow

@@ -328,9 +328,6 @@ def _not_revealed(case: Scenario, error: FloorOutOfReach, primitives: Sequence[P
     )
 
 
-# Durations for people: key numbers and tables.
-
-
 def design_document(design: DurationDesign, compared: Sequence[Efficiencies] | None = None) -> Document:
     """What a document says of durations.
 

@@ -219,8 +219,6 @@ def _risk_summary(risk: RiskEstimate | None) -> dict[str, object]:
     }
 
 
-# Every file of a planned trial.
-
 SAILED_BY = ("route.*", "cards.html", "commands.csv")
 """Names of files by which a trial is sailed."""
 

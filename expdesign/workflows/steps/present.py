@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from expdesign.scenario.scenario_file import berth_problem, build_berth
 from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, acting_response, delivered_at_samples
-from expdesign.values import Array, seal
+from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 from expdesign.workflows.steps.known import updated
 from expdesign.workflows.steps.measured import data_files, equipped, measured
@@ -33,7 +33,7 @@ MOTION_S, MOTION_ROWS = 5.0, 3
 PARTICULARS = ("length_m", "beam_m", "draught_m", "sample_time_s")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(pose="3")
 class PresentState:
     """Where a trial stands."""
 
@@ -48,9 +48,6 @@ class PresentState:
     origin: str  # where its model comes from
     notes: tuple[str, ...]  # what a reader must hear
     under_way: UnderWay | None = None  # how it moves; None where it has stopped through the water
-
-    def __post_init__(self) -> None:
-        seal(self, pose="3")
 
 
 def present_state(

@@ -135,8 +135,6 @@ def parameters_of(case: Scenario) -> tuple[str, ...]:
     return estimated_parameters(case.vessel.model, case.design.fixed_parameters)
 
 
-# The grown dictionary of a scenario, its files and its tables.
-
 STEM = "dictionary-grown"
 
 

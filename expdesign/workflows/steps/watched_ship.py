@@ -40,8 +40,6 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.workflows.steps.measured import measured
 
-# What a watch takes for the ship: the vessel file's model, or a yaw model learnt from the reference.
-
 VESSEL = "vessel"
 YAW = {f"yaw-{name}": YAW_MODELS[name] for name in ("full", "simplified")}
 
@@ -98,8 +96,6 @@ def ship_grams(
         return grams_of(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, noise=known), known
     return grams_and_noise(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, known=known)
 
-
-# Pieces of operational data as records with their inner products, which processes may prepare ahead of the watch.
 
 FEWEST_LINES = 4
 """Fewest lines of a piece that is read."""
