@@ -102,8 +102,6 @@ def considered(found: Estimate, record: Record, vessel: Vessel, again: Callable[
     """An estimate with the errors of times that it holds in its covariance.
 
     Args:
-        found: from the record.
-        record: its data.
         vessel: which they are delivered by; states the standard deviations.
         again: the same estimate from other data.
     """
@@ -147,7 +145,6 @@ def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Ve
     """An estimate with times in place of their changes, and a sentence on what became of uncertain ones.
 
     Args:
-        found: from the record.
         record: with what the vessel delivers.
         stated: as the vessel's file has it.
         vessel: the same, or with times that were found since.
@@ -193,7 +190,6 @@ def with_held_noted(found: Estimate, record: Record, stated: Vessel) -> Estimate
     """An estimate with a sentence on stated errors that its standard deviations leave out: all but those of times.
 
     Args:
-        found: from the record.
         record: which a sensor shows whose errors count.
         stated: as the vessel's file has it.
     """

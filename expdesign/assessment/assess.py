@@ -83,7 +83,6 @@ def settled(
     Args:
         vessel: as its file states it.
         raw: with commands as inputs.
-        options: methods and settings.
         smoothed: whether velocities from the pose are smoothed, as in `reduced`.
 
     Raises:
@@ -121,9 +120,7 @@ def assess(
     A method without an estimate is listed in `failures`, as long as another one has one.
 
     Args:
-        vessel: structure, start values and sensors.
         record: estimation data.
-        options: methods, fixed parameters and settings.
         tests: runs that are simulated but not used.
         stated: as the vessel's file has it, where `vessel` has dead times or lags that were found since.
 
@@ -183,7 +180,6 @@ def with_unstated(
         vessel: as in `assess`.
         raw: with commands as inputs.
         options: as in `assess`.
-        found: its result.
         smoothed: as in `settled`.
     """
     if options.motion != CONTINUOUS:

@@ -131,7 +131,6 @@ def decomposed(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool
     """Decompose the misfit of a run.
 
     Args:
-        model: with the estimate.
         run: its simulation; where that diverged shares are nan.
         found: the estimate, for its covariance.
         wind: whether the model is simulated in the measured wind.
@@ -315,7 +314,6 @@ def one_step(
 
     Args:
         model: the initial model; gives the values of the fixed parameters.
-        fixed: fixed parameters.
         quadrature: one of `predictors.QUADRATURES`.
     """
     method = method_named(found.method)

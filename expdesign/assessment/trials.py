@@ -240,9 +240,7 @@ def attempted(
     """One estimate of a vessel from a record; errors as of `assess`.
 
     Args:
-        work: its options.
         vessel: whose values it starts from.
-        method: the method.
         start: of the first instruments.
         times: estimated too.
         begun: where output error goes on.

@@ -138,10 +138,8 @@ def found_by_predictions(
     many more numbers, and an alternative unless they do worse for certain.
 
     Args:
-        kept: the causes that the search found.
         compared: causes, by their predictions.
         data: as compared, and as measured.
-        ship: the model in use.
         re_estimated: errors of the model with parameters re-estimated and no cause, where causes are compared beside
             the parameters of the file; None where they are compared beside re-estimated ones.
     """
@@ -220,8 +218,6 @@ def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossV
 
     Args:
         held: errors on held-out units of the model before any cause, then after every step, and perhaps of more.
-        validation: of other fits.
-        windows: all data.
 
     Source: J. Lei, M. G'Sell, A. Rinaldo, R. J. Tibshirani and L. Wasserman, Journal of the American Statistical
     Association 113 (2018), 1094-1111, section 6: leave one covariate out.
@@ -251,9 +247,7 @@ def harmless_beside_the_file(
 
     Args:
         kept: the causes, beside re-estimated parameters.
-        ship: the model in use.
         as_stated: its errors as its file states it.
-        validation: of other fits.
         data: as compared, and as measured.
     """
     windows, record = data
@@ -318,7 +312,6 @@ def without_harm(
 
     Args:
         held: errors on held-out units of the model before any cause, then after every one.
-        ship: the model in use.
     """
     while kept.steps and harms(ship, kept.last.ship, record):
         kept, held = kept.with_steps(kept.steps[:-1]), held[:-1]

@@ -132,7 +132,6 @@ def compare_predictions(
     Args:
         ship: the model that the search for causes begins with.
         short: data in short stretches.
-        seed: of the gains' intervals.
         asked: causes that may be found; empty where all may.
     """
     activity = "comparing causes by predictions"

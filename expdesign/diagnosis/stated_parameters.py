@@ -49,7 +49,6 @@ def parameters_alone(kept: Selection, held: Sequence[HeldOut], validation: Cross
 
     Args:
         held: errors on held-out units of the model before any cause, then after every one.
-        validation: of other fits.
     """
     exceeded = kept.steps and kept.first.keys and not kept.beside_stated and not within_stated_std(kept.first)
     if not exceeded or only_nuisance(kept.steps[0], kept):

@@ -237,7 +237,6 @@ def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
     """Commands of many specifications; impossible ones are marked instead of raising.
 
     Args:
-        vessel: nominal.
         specs: of the same duration.
     """
     samples = round(specs[0].settings["duration_s"] / vessel.sample_time_s)

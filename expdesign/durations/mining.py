@@ -112,7 +112,6 @@ def build_recorded(
         run_s: (q,) duration of one whole run of each [s].
         total_s: total time of all primitives [s].
         mean_subtraction: "none", "batch" or "complete".
-        constraints: limits on the durations.
     """
     return DurationProblem(
         names=tuple(batch.name for batch in batches),

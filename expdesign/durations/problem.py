@@ -157,7 +157,6 @@ def build_durations(
         total_s: total time of all primitives [s].
         mean_subtraction: "none", "batch" or "complete".
         aim: criterion with its settings; D when not given.
-        constraints: limits on the durations.
         prior: (d, d) prior information, per sample of the total time; see `prior_information`.
         sampled: the information by each model drawn from the prior of the nominal parameters.
         robust: one of `ROBUST`.
@@ -247,7 +246,6 @@ def build_fused(
 
     Args:
         names: of the q primitives.
-        parameters: p names.
         covariances: (q, p, p) of estimates from each primitive alone.
         seconds: (q,) length of the data behind each covariance [s]; covariances fall with time as 1/t.
         run_s: (q,) duration of one whole run [s].

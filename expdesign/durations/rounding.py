@@ -70,7 +70,6 @@ def runs_above_floors(
     runs that keep it.
 
     Args:
-        problem: as there.
         starts: fractions (q,); the first that leads to such runs is where the search begins.
         shortfall: of shares of the time, 0 where everything is kept.
 

@@ -72,7 +72,6 @@ def improved(problem: DurationProblem, polytope: Polytope, start: Array | None) 
 
     Args:
         problem: with matrices that need not be symmetric.
-        polytope: limits.
         start: (q,), or None for `STARTS` random ones.
 
     Raises:

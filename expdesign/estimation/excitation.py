@@ -100,7 +100,6 @@ def check_excitation(
     """Every modulus of velocities that breaks the condition, batch by batch; empty when the condition holds.
 
     Args:
-        model: whose terms hold the moduli.
         worst: noise, current and wind.
         wind_measured: air velocities are data; otherwise ship velocities stand for them and must beat the wind.
     """
@@ -125,7 +124,6 @@ def clear_sides(model: VesselModel, table: SignalTable, *, worst: WorstCase, win
     """Every modulus of velocities, by what stands inside, at every sample of a table of signals.
 
     Args:
-        model: whose terms hold the moduli.
         table: signals (k,) of one batch.
         worst, wind_measured: as in `check_excitation`.
     """

@@ -145,7 +145,6 @@ def estimate(
         record: batches with the model's inputs, or generalised forces.
         model: structure; its values start the instruments and stand for parameters held fixed.
         method: a name in `METHODS`.
-        settings: the rest.
         progress: of output error; the others are quick.
 
     Raises:

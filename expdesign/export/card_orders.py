@@ -45,9 +45,7 @@ def heading_rows(zigzag: Primitive, vessel: Vessel, values: Array, step_s: float
 
     Args:
         zigzag: with `helm_rad` > 0 where the first turn is to starboard, and `heading_rad`.
-        vessel: whose signals they are.
         values: (k, m) commands of the run.
-        step_s: between them.
     """
     helm, change = (math.degrees(zigzag.settings[key]) for key in ("helm_rad", "heading_rad"))
     ends = [*_reversals(vessel, values), len(values)]
@@ -120,9 +118,7 @@ def order_rows(vessel: Vessel, values: Array, step_s: float) -> tuple[list[tuple
     """Time from the start of the run [s] and every signal, row by row; and the largest error as a share of its range.
 
     Args:
-        vessel: whose signals they are.
         values: (k, m) commands of a run.
-        step_s: between them.
     """
     kept, missed = condensed(values)
     columns, side = order_columns(vessel), starboard_helm(vessel)

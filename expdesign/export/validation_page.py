@@ -91,7 +91,6 @@ def judgements(rehearsal: Rehearsal, results: Sequence[Validated], *, noisy_modu
     """The conclusions from the trials, in sentences.
 
     Args:
-        rehearsal: the simulated trials.
         results: of every design, that of the optimised one first.
         noisy_moduli: primitives of the optimised design in which noise or weather may change the sign of a velocity
             inside an absolute value.

@@ -62,7 +62,6 @@ def information_of_runs(
     """(q, c + m, c + m) information of one run of each manoeuvre, the mean over `HEADINGS` first headings.
 
     Args:
-        vessel: the model in use.
         base: fit of the trial that the runs are added to: its model, nuisance and noise.
         primitives: q manoeuvres.
         directions: m effects; a change of the ship has happened before the runs.

@@ -254,7 +254,6 @@ def sizes_that_matter(
     """The smallest size of each effect that costs points of fit or changes an outcome of the standard trials.
 
     Args:
-        directions: effects.
         trials: standard trials; None where there are none, so that defaults count.
         stated_std: standard deviations of effects in the vessel file; what is within them is no cause.
         defaults: size by kind of effect, where the rule gives none.
@@ -331,7 +330,6 @@ def with_effect(vessel: Vessel, ship: ExtendedModel, item: Direction, size: floa
     """The vessel with an effect of some size; one that is changed during a trial as it is after the change.
 
     Args:
-        vessel: the model in use.
         ship: its extended model for the records of a trial.
     """
     present = {key: ship.get(key) + value if key in item.shares else value for key, value in item.at(size).items()}

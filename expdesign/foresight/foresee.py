@@ -68,11 +68,9 @@ def foresee(
     """The probability that a diagnosis of a trial would find each cause at a size that matters.
 
     Args:
-        vessel: the model in use, with its sensors.
         weather: the forecast; how it varies is in the trial.
         offers: manoeuvres whose runs may be added.
         sizes: of causes, in the unit of their effects in results, instead of those that matter.
-        seed: of all chance.
 
     Raises:
         Diverged: the model cannot be simulated over the trial.
@@ -118,7 +116,6 @@ def sizes_of(
     """Per effect, the size of each of its directions: that matters, or is stated for its cause.
 
     Args:
-        vessel: the model in use.
         known: the trial that they are hidden in.
         stated: size by cause, in the unit of its effects in results.
     """
@@ -235,7 +232,6 @@ def _against(
 
     Args:
         effect: hidden.
-        rivals: all candidates.
         shift: (m,) expected scores.
         exact: (n,) gain of the hidden effect itself in every draw, which a fit of a finite effect finds.
         test: noncentrality, freedom and level of its own test.

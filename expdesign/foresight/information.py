@@ -90,7 +90,6 @@ def simulated_units(
 
     Args:
         base: the fit to a record.
-        windows: its data.
         again: other records of the same runs, simulated by the model that they come from.
     """
     unit = validation_units(windows)
@@ -166,7 +165,6 @@ def joint_information(
 
     Args:
         known: the trial with nothing hidden.
-        hidden: effects.
         sizes: of the directions of each; where one is not finite, the effect is taken as it is.
     """
     base = known.base

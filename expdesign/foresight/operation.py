@@ -242,14 +242,12 @@ def foresee_operation(
     """What a watch over a ship would find, by simulated voyages.
 
     Args:
-        vessel: the ship, with its sensors.
         forecast: weather; each voyage draws its means and how they vary.
         voyages: of each change and size, and as many without a change for each.
         hours: length of a voyage [h].
         false_alarm_days: average time between false alarms at least [d].
         sizes: shares of the changes.
         references: voyages of `REFERENCE_S` that the watch learns from.
-        seed: of all chance.
 
     Raises:
         NotInformative: the reference has no information.

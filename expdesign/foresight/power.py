@@ -129,7 +129,6 @@ def gains(rivals: Rivals, shift: Array) -> Array:
     """(n, t) likelihood gain of every candidate in every draw, with an effect hidden.
 
     Args:
-        rivals: all candidates.
         shift: (m,) expected scores by the hidden effect: its column of the information.
     """
     squares = (rivals.white + shift @ rivals.whitening) ** 2
@@ -261,7 +260,6 @@ def imitation(rivals: Rivals, shift: Array, own: float) -> Array:
     """(t,) cosine between the hidden effect and the best of each candidate, beside nuisance.
 
     Args:
-        rivals: all candidates.
         shift: (m,) as in `gains`.
         own: noncentrality of the hidden effect.
     """

@@ -112,12 +112,9 @@ def wanted(
     Noise and the number of tests are those of a trial with one run of every manoeuvre.
 
     Args:
-        vessel: the model in use, with its sensors.
         primitives: q manoeuvres.
-        reveal: causes.
         apart: pairs of causes to tell apart.
         sizes: of causes, in the unit of their effects, instead of those that matter.
-        seed: of all chance.
 
     Raises:
         NoAnswer: records of the trial cannot show a cause.

@@ -129,7 +129,6 @@ def background(vessel: Vessel, runs: Sequence[TrialRun], weather: Environment, *
     """Simulate a trial without hidden effects, and prepare its tests.
 
     Args:
-        vessel: the model in use, with its sensors.
         seed: of sensor noise, weather and the null distribution of the tests.
     """
     rng = np.random.default_rng(seed)

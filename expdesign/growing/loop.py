@@ -95,7 +95,6 @@ def grow_dictionary(
     """Add the most informative manoeuvres of the families to a scored dictionary, one by one, for the D criterion.
 
     Args:
-        vessel: nominal.
         information: the present dictionary, scored with the same environment, fixed parameters and mean subtraction.
         environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
 

@@ -100,7 +100,6 @@ def read_stamps(texts: Sequence[str], *, day_first: bool = True) -> Stamps:
     """Dates and times of day; nan where a text is neither.
 
     Args:
-        texts: cells.
         day_first: whether 3/4/2024 is in April, where the texts themselves do not tell.
     """
     days: dict[str, float] = {}
@@ -196,7 +195,6 @@ def read_numbers(values: Array, name: str, *, unit: str = "") -> tuple[Array, st
     """Numbers (k,) as times [s], the kind of clock, and how they were read in words.
 
     Args:
-        values: as they stand.
         name: of the column, in lower case words, whose last may be the unit.
         unit: where the file says it.
     """

@@ -240,7 +240,6 @@ def _removed(circle: Circle, half_turn_s: float) -> tuple[str, ...]:
     """A remark on the current that was taken out, where it matters, or that it was not.
 
     Args:
-        circle: as measured.
         half_turn_s: time from the order to 180 degrees of turn, or to the end of the record [s].
     """
     if circle.current_north_mps is None:

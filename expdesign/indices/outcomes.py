@@ -32,9 +32,7 @@ def outcome_gradients(
     """Named outcomes (o,) at the nominal model, and their gradients (o, p) by named parameters.
 
     Args:
-        vessel: nominal.
         names: keys of `indices.OUTCOMES`.
-        parameters: p names.
         speed_mps: approach speed for all parameter values; that of the nominal model when not given.
 
     Raises:
@@ -214,7 +212,6 @@ def outcomes(
     crossings are interpolated.
 
     Args:
-        vessel: structure, actuators and nominal parameters.
         speed_mps: approach speed, or None for the speed at 85 % of the engines' power *of these parameters*; give it
             when parameters vary, so that the trial stays the same.
         parameters: (p,) other parameter values, or None for the vessel's.

@@ -67,7 +67,6 @@ def bordered_by_current(vessel: Vessel, M: Array, rows: Array, J: Array, paramet
     """(d + 2, d + 2) information about parameters, means and a steady current.
 
     Args:
-        vessel: gives the terms.
         M: (d, d) sum over samples with the current known, as of `durations.bordered_moments`.
         rows: (k, all) values of terms.
         J: (k, n, 2) from `current_rows`.
@@ -175,7 +174,6 @@ def score_augmented(
     """Information of every primitive about the ship's parameters and the nuisance parameters of a predictor.
 
     Args:
-        vessel: nominal.
         predictor: one with nuisance regressors, see `estimation.predictors`.
         environment: mean current and wind.
         fixed_parameters: held at the nominal values.
@@ -292,10 +290,8 @@ def bordered_runs(
     leaves a steady current unknown.
 
     Args:
-        vessel: nominal.
         commands: (n, k, m) commands of each run.
         velocity: (n, 3) entry velocities through water.
-        names: parameters to estimate.
         environment: mean current and wind; information is averaged over headings in them, or over the courses.
         mean_subtraction: "none", "batch" or "complete".
         standing: (n, m) commands before the first sample; None for those of the first sample.

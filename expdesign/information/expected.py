@@ -67,7 +67,6 @@ def expected_covariance(
     """(p, p) covariance of the estimates of the named parameters from a trial.
 
     Args:
-        vessel: gives the motion and the sensors.
         parts: of the trial; noise is independent between parts.
         parameters: names of the estimated parameters, in the order of the result.
         environment: mean current and wind, and the current's white variation from sample to sample.

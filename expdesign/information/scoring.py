@@ -61,7 +61,6 @@ def score_primitives(
     are averaged, because its heading is not known before the plan.
 
     Args:
-        vessel: nominal.
         environment: mean current and wind, and their spread.
         fixed_parameters: held at the nominal values.
         mean_subtraction: "none", "batch" or "complete".

@@ -211,7 +211,6 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: boo
     heading show of each other's clocks stands beside (`Record.shown`).
 
     Args:
-        record: as measured.
         vessel: what its file states of actuators and sensors, which is taken into account.
         smoothed: whether velocities from the pose are smoothed, rather than central differences.
         undo: whether faults that are certain are undone; not where a change of them is watched for.

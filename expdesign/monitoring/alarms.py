@@ -295,7 +295,6 @@ def _attributed(
     """The change that explains the data since an alarm's beginning best, among those that are watched.
 
     Args:
-        alarm: before.
         pending: sums since then, for the ship of the state.
         named: the change, where it is known.
     """

@@ -30,7 +30,6 @@ def turned(
     Args:
         columns: (c, w, s, 4), zero where not measured.
         seen: (w, s, 4) what is measured; of the rate of a heading, neither the first sample of a stretch nor its last.
-        noise: of the sensors.
         sample_s: between samples [s].
     """
     inner = np.s_[:, 1:-1]

@@ -117,7 +117,6 @@ def watch(
     """Go on watching for a while.
 
     Args:
-        state: before.
         grams: of the stretches that follow, in order of time, linearised at the ship changed by `state.shift`.
         rules: threshold and port calls.
         again: the stretches so far, those of `grams` among them; None where they are not kept.

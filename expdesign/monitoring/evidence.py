@@ -123,7 +123,6 @@ def grams_of(
 
     Args:
         ship: the model with what its file states.
-        record: measured data.
         changes: watched for.
         begins_s: time of the first sample of each batch [s].
         stretch_s: length of a stretch [s].

@@ -136,7 +136,6 @@ def beside(one: Judged, taken: Array) -> tuple[Array, Array, Array]:
     """Score (..., m) and information (..., m, m) of changes that were there before a stretch, and what is taken after.
 
     Args:
-        one: the stretch.
         taken: (..., n, m) what the filter has taken of each change for the force and the load before it.
 
     Source: P. de Jong, Annals of Statistics 19 (1991), 1073-1083, for a regression beside a filter.

@@ -85,7 +85,6 @@ def roll_watched(
     """The watch of roll after another piece of data.
 
     Args:
-        now: before.
         ship: with [roll].
         begin_s, end_s: of the piece [s].
         mean_time_s: average time between false alarms of roll [s].

@@ -131,7 +131,6 @@ def with_scatter(vessel: Vessel, slopes: Array, covariance: Array) -> Vessel:
     """The vessel whose parameters have a covariance: that of the factors, and a scatter of their own.
 
     Args:
-        vessel: nominal.
         slopes: (p, f) of parameters by deviations.
         covariance: (f, f) of the deviations.
     """

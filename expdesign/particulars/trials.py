@@ -38,7 +38,6 @@ class Fleet:
         """Take variants.
 
         Args:
-            vessel: structure and actuators.
             parameters: (n, p) of the variants.
             fastest_mps: above which no steady speed is looked for.
         """

@@ -88,7 +88,6 @@ class Fleet:
         """All ships begin in one state (6,) with commands (m,) that have stood for long.
 
         Args:
-            vessel: structure, actuators, sample time.
             environment: how current and wind vary.
             truths: of each ship.
             state, standing: at the beginning.
@@ -238,7 +237,6 @@ def dispersion_m(
         vessel, primitive, environment: the nominal run and what is uncertain about it.
         centres_m: (c,) forward positions of the discs that cover the hull.
         confidence: between 0 and 1.
-        rng: draws.
         draws: how many; by default by `Tuning`.
 
     Raises:
@@ -313,7 +311,6 @@ def run_at_headings(
     """(k + 1, n, 6) states over ground of a run that begins at the origin at headings (n,).
 
     Args:
-        vessel, primitive: ship and run.
         heading: of each ship [rad].
         entering: (2,) current through which all begin with the entry velocity [m/s].
         current_to, wind_to: (n, 2) or (k, n, 2) during the run [m/s].

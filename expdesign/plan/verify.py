@@ -54,10 +54,8 @@ def verify_plan(
 
     Args:
         vessel, environment: the nominal model and the forecast's means.
-        area: allowed water.
         clearance_m: required distance from hull to forbidden water.
         transit_mps: stated speed of legs through water.
-        primitives: the dictionary by name.
         repeats: how often each is to be run.
         start, goal: (3,) poses where the ship is to begin, and to end at rest through the water.
         under_way: motion at the start and commands standing there; None for rest and zeros.

@@ -148,7 +148,6 @@ def validate(
     """Validate every design of a rehearsal; processes share the chunks of trials.
 
     Args:
-        rehearsal: the designs and ships.
         done: rows of chunks from an earlier, interrupted call with the same rehearsal.
         keep: called with the key and rows of each finished chunk.
 
@@ -382,7 +381,6 @@ def estimates_alone(
         total_s: informative time of the whole design [s].
         trials: of each primitive.
         environment: weather, drawn anew for each trial as far as it is uncertain.
-        seed: of all random numbers.
 
     Raises:
         InputError: fewer trials than a covariance of so many parameters needs.

@@ -90,7 +90,6 @@ def coefficients(theta: Array, body: Body, load: Load | None) -> Coefficients:
 
     Args:
         theta: (9,) parameters.
-        body: what is known of the ship.
         load: on board; None for the unknown one, which is among the parameters.
     """
     sums = _sums(theta, body, load)
@@ -140,9 +139,7 @@ def relative_sensitivity(theta: Array, body: Body, loads: Sequence[Load | None],
 
     Args:
         theta: (9,) parameters, the free ones not zero.
-        body: what is known of the ship.
         loads: of the cases; None for the unknown one.
-        free: names of the parameters.
     """
     places = [PARAMETERS.index(name) for name in free]
     found = [coefficients(theta, body, load) for load in loads]

@@ -148,10 +148,8 @@ def open_directions(
     """Singular values (p,) of the relative sensitivity, falling, and the directions that the equations leave open.
 
     Args:
-        body: what is known of the ship.
         theta: (9,) parameters, the free ones not zero.
         loads: of the cases; None for the unknown one.
-        free: names of the parameters.
     """
     sizes, rows = _singular(relative_sensitivity(theta, body, loads, free))
     return sizes, tuple(direction(free, theta, row, 0.0) for row in rows[_rank(sizes) :])

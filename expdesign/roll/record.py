@@ -40,7 +40,6 @@ def roll_run(batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = 
     """Signals of a batch; the accelerometer counts to port in the room of roll.
 
     Args:
-        batch: measured.
         rudder: signals whose mean steers; found by their kinds when empty.
         ship: whose file states how late actuators are; None for none.
         body: that says where the sensor is along the ship, and its tilt; that of the ship's [roll] when left out.

@@ -294,9 +294,7 @@ def berth_problem(berth: Berth, vessel: Vessel, area: SeaArea, settings: PlanSet
     """What is wrong with a start or goal, or "" when the hull keeps its clearance there.
 
     Args:
-        berth: the place.
         vessel: gives the hull rectangle.
-        area: allowed water.
         settings: with the least distance of the hull from anything forbidden.
         end: (3,) pose at the other end of the trial.
         way: to it or from it, e.g. "a way to the goal".

@@ -67,7 +67,6 @@ def manoeuvres_worth_adding(
     Args:
         problem: gives the dictionary, the limits on runs, and the way from start to goal. Where it asks for a draft,
             there are fewer candidates and fewer searches.
-        accuracy: to be reached.
         settings: of the search; seconds worth take the place of sensitivity.
         day_s: length of a day whose runs tell as much as can be [s], instead of the accuracy.
 

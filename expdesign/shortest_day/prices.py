@@ -231,7 +231,6 @@ def learnt_prices(problem: PlanProblem, days: Sequence[DraftedDay]) -> Prices:
     """Prices by all days so far; `level` is left at 0.
 
     Args:
-        problem: gives the dictionary.
         days: one at least; runs are taken to lie along the track of the last.
     """
     told = np.array(

@@ -88,12 +88,9 @@ def simulate_ensemble(
     """Simulate and measure many trials.
 
     Args:
-        vessel: model, sample time and sensors.
         inputs: (k, runs, m) commands in the model's order, or (k, m) for all runs alike.
-        runs: number of runs.
         environment: forecast; every run draws its own means around it, where they are not given, and its own
             variation.
-        rng: source of all random numbers.
         pose, velocity: start, (3,) or (runs, 3).
         parameters: (runs, p) in the model's own form, or None for the model's.
         standing: (m,) commands that stood before the first sample; None for those of the first sample.

@@ -69,7 +69,6 @@ def motion_rates(
     """Time derivative of the state, (6,) or with roll (8,), under held inputs and steady n-frame current and wind.
 
     Args:
-        model: structure and actuators.
         state: as above.
         inputs: delivered by the actuators.
         current_to, wind_to: to north and east [m/s].

@@ -211,7 +211,6 @@ class RatesProgram:
         """Write the equations down and set memory aside.
 
         Args:
-            model: structure and actuators.
             runs: n.
             parameters: (p,) for all runs alike or (n, p), in the model's own form; None for the model's.
             engine: "numpy", or "numba" which does the calls of a step in compiled code.

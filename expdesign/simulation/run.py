@@ -147,7 +147,6 @@ def simulate(
     """Run the commands from a pose and a velocity over ground under an environment's means or a series of weather.
 
     Args:
-        vessel: whose model is integrated.
         commands: k samples, held.
         pose, velocity: (3,) at the first sample.
         environment: its means act as steady n-frame current and wind; a series acts sample by sample.
@@ -203,7 +202,6 @@ def integrate_motion(
     """`simulate` for delivered inputs: states (k + 1, 6), pose and velocity, the start first.
 
     Args:
-        vessel: whose model is integrated.
         delivered: (k, substeps, m), or (k, 1, m) where inputs are held over a sample; as `deliver` gives them.
         start: (6,) pose and velocity over ground; a model with a roll mode begins upright.
         sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
@@ -260,7 +258,6 @@ def simulate_many(
     """Many runs at once: the same commands for n truths, or commands of their own for each.
 
     Args:
-        vessel: gives structure and actuators.
         commands: k samples, held, for all runs alike; or (n, k, m) in the model's order.
         pose, velocity: (n, 3) start states.
         current_to, wind_to: n-frame velocities, (n, 2) when steady, or (k, n, 2) sample by sample.

@@ -158,11 +158,9 @@ def measure(
     """Measured signals as the vessel's sensors measure them, named and in units as in measured-data files.
 
     Args:
-        vessel: whose sensors measure.
         commands: k samples, recorded as they were given.
         trajectory: k + 1 samples; the last is left out, as no command follows it.
         environment: the actual current and wind, steady or sample by sample.
-        rng: noise.
 
     Returns:
         Column name -> (k,). Wind is the relative wind in the b-frame, the air's velocity past the ship taken as

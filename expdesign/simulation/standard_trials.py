@@ -193,7 +193,6 @@ def turning_circle(
     """Helm over from a straight approach, held until the heading has changed by `turn_rad`.
 
     Args:
-        vessel: nominal model.
         helm_rad: size of the change of helm, or None for 35 degrees or what the actuators can give.
         side: "starboard" or "port", to which the ship turns; the sign of the helm follows from the model.
         turn_rad: change of heading that ends the trial, positive.
@@ -220,7 +219,6 @@ def zigzag(
     """Helm to one side until the heading has changed by `heading_rad`, then to the other, and so on.
 
     Args:
-        vessel: nominal model.
         heading_rad: change of heading at which the helm is reversed, positive.
         helm_rad: size of the helm, positive.
         side: to which the ship turns first.
@@ -285,7 +283,6 @@ def stopping(vessel: Vessel, *, astern: float = 1.0, conduct: Conduct = AT_SERVI
     """Full astern from a straight approach, helm unchanged, until the ship has no headway.
 
     Args:
-        vessel: nominal model.
         astern: engine order, 1 for full astern, 0 for stopped engines.
         conduct: as in `turning_circle`.
 

@@ -33,7 +33,6 @@ def required_push(
     Directions that it cannot push (no equation, no gain) get the least-squares answer.
 
     Args:
-        model: with the terms.
         velocity, acceleration: through the water.
         sway: whether sway counts; without, models not by force leave it to itself.
         near: (..., m) commands a sample before, near to which models not by force seek others; None for any.

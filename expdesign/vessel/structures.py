@@ -59,7 +59,6 @@ def parse_expression(text: str, *, signals: tuple[str, ...]) -> Expression:
     """Parse a term such as ``u*abs(u)`` or ``abs(n1)*n1*sin(rudder1)``.
 
     Args:
-        text: the expression.
         signals: the names it may use.
 
     Raises:

@@ -197,7 +197,6 @@ def required_thrust(
     The speed of propellers, that of azimuth thrusters ahead and to starboard, the angle of rudders.
 
     Args:
-        model: with the terms.
         velocity, acceleration: through calm water and air.
         sway: whether sway counts; without, it is left to itself.
         near: (..., m) commands a sample before, that others are sought near to.

@@ -45,7 +45,6 @@ def chart_of(area_file: str, draught_m: float) -> Answer:
     """Land, allowed water, depths and named zones of an area file as GeoJSON; or what is wrong with it.
 
     Args:
-        area_file: path.
         draught_m: of the ship, which decides what is deep enough.
     """
     try:

@@ -77,7 +77,6 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
 
     Args:
         scenario: a scenario, or its file.
-        seed: of all chance.
 
     Raises:
         InputError: something in the files is wrong.

@@ -43,7 +43,6 @@ def finding_of(
     Args:
         last: the joint fit of all steps, which the estimates come from.
         held: errors on held-out units without and with the cause.
-        windows: all data.
         would_tell_apart: the manoeuvre that distinguishes the cause from its alternatives best.
     """
     chosen, (before, after) = step.chosen, held
@@ -131,8 +130,6 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
     """Effects that the data cannot show.
 
     Args:
-        vessel: the model in use.
-        windows: the data as compared.
         constant: inputs that never change.
     """
     notes = []
@@ -173,7 +170,6 @@ def note_on_divergence(before: Accuracy, windows: Windows, *, re_estimated: bool
 
     Args:
         before: accuracy of the model in use.
-        windows: the data as compared.
         re_estimated: the search began with the model re-estimated, instead of as it is.
         uncertain: something in the vessel file has a standard deviation.
     """

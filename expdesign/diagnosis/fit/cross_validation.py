@@ -89,8 +89,6 @@ def cross_validate(
 
     Args:
         found: its fit to all units; None for a model that is not fitted.
-        ship: the model.
-        windows: all data.
         record: the same data, which stretches are cut from where units are batches; else they are parts of windows.
     """
     unit = validation_units(windows)
@@ -123,9 +121,7 @@ def _in_stretches(
     """Errors in short stretches, one part of every run held out at a time.
 
     Args:
-        ship: the model.
         free: effects without a prior that are fitted; None for a model that is not fitted.
-        windows, record: all data.
     """
     short = _stretches(windows, validation_units(windows), ship, record)
     try:

@@ -125,7 +125,6 @@ def prior_precision(ship: ExtendedModel, keys: tuple[str, ...], *, free: int = 0
     """(c, c) inverse covariance of effects with a standard deviation in the vessel file, zero for others.
 
     Args:
-        ship: the model in use.
         free: this many of the first have no prior; that of the others is their marginal one.
     """
     whitening = _prior_whitening(ship, keys, free)

@@ -71,7 +71,6 @@ def estimate_noise(
 
     Args:
         found: sensitivities and error.
-        prior: of the estimated effects.
         noise: a first guess; without one the estimate takes a few passes from white noise.
         grams: of the sensitivities under the first guess, if they are known.
         ar_order: of the autoregressions, or None to choose it.

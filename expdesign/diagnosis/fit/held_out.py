@@ -326,7 +326,6 @@ def prediction_gain(
 
     Args:
         before: the model without it, fitted without each of the units that it is held out of; after: with it.
-        windows: all data.
         noise: that both are whitened by.
     """
     middle, std, freedom = _mean_change(before, after, windows, noise)

@@ -41,8 +41,6 @@ def fit_ahead(found: Fit, windows: Windows, short: Windows, *, beside_stated: bo
     Standard errors are no smaller than those of the fit, and than the scatter from stretch to stretch tells.
 
     Args:
-        found: the fit, of all windows.
-        windows: that it is of.
         short: the same data in short windows.
         beside_stated: beside the parameters of the vessel file, as these stand in it.
 
@@ -75,7 +73,6 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
     does not succeed, it is as given. Windows that stay as short are those of output error, as models are judged in.
 
     Args:
-        ship: the model in use.
         windows: of the data, short enough for the model in use.
     """
     if _length_s(windows) > AHEAD_S or windows.steps >= longest_windows(ship, record).steps:

@@ -39,7 +39,6 @@ def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tupl
     """Delivered inputs (k, m, b) of batches of equal length, and how many of their rows an integrator step has.
 
     Args:
-        ship: its actuators.
         rows: (k_b, m, b) held inputs.
         windows: that they belong to.
     """
@@ -159,7 +158,6 @@ def exogenous_inputs(
     """The exogenous signals, with the inputs as delivered by the actuators.
 
     Args:
-        ship: model and effects.
         windows: w windows.
         known: another ship and its signals over the same windows; the same actuators are not followed again.
     """

@@ -98,7 +98,6 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
     """(w, s, 4) sensor outputs.
 
     Args:
-        ship: its sensors.
         states: (w, k, n) at integrator steps.
         windows: measured channels and times.
         heading_change: (w, k) heading since the start; integrated from the yaw rate when None.

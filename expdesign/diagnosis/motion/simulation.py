@@ -46,7 +46,6 @@ def simulate_windows(
     """Runge-Kutta of order four with inputs held over every step.
 
     Args:
-        ship: model and effects.
         windows: w windows.
         start: (w, n) initial states.
         warm_start: linearised motion of a similar ship; it speeds up the simulation and does not change it.

@@ -277,9 +277,7 @@ def with_unlisted_terms(
     Other values of parameters imitate terms of another form. So first each such cause is compared with such a term.
 
     Args:
-        kept: the causes of the catalogue.
         held: errors on held-out units of the model before any cause, then after every one.
-        seed: of draws and intervals.
         rejected: fits of causes that are significant and improve nothing on held-out data, first ones first: what is
             missing may show beside the cause that imitates it. What shows only without that cause may imitate it, and
             is as uncertain.

@@ -46,7 +46,6 @@ def eliminate_backward(
     Args:
         cross_validated: the selection, its causes fitted as they are judged, and errors on held-out units of the model
             before any cause, then after every step.
-        seed: of the gains' intervals.
         re_estimated: errors of the model before any cause with its uncertain parameters fitted; None where it has none.
 
     Returns:
@@ -85,10 +84,8 @@ def _is_needed(found: Selection, held: Sequence[HeldOut], without: Sequence[Held
     """Whether simulations of held-out data need a cause beside the others, for certain.
 
     Args:
-        found: the causes with gain.
         held: errors on held-out units of the model before any cause, then after every step.
         without: the same without the cause, the others fitted again.
-        seed: of the gains' intervals.
     """
     before, after = without[len(found.steps) - 1], held[len(found.steps)]
     return shows_for_certain(before.like(after), after.like(before), seed)
@@ -177,7 +174,6 @@ def improves_held_out(
 
     Args:
         held: errors on held-out units of the model before any cause, then after every step.
-        seed: of the gains' intervals.
         windows: all data; None where there are no predictions of them.
         re_estimated: errors of the model before any cause with its uncertain parameters fitted; None where it has none.
     """

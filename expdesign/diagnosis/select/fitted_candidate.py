@@ -103,9 +103,7 @@ def fit_candidate(
 
     Args:
         base: the fit without it.
-        point: starting point.
         far: the effect is large, so begin in windows of middle length.
-        steps: Gauss-Newton steps.
     """
     try:
         nearby = base.ship.with_effects(point.effects), base.starts

@@ -38,7 +38,6 @@ def stated_std(vessel: Vessel, inputs: tuple[str, ...], derived: tuple[str, ...]
     Args:
         vessel: its file.
         derived: velocities that come from the pose.
-        stated: effects.
     """
     weather = vessel.environment
     flows = {"current": weather.current_std_mps, "wind": weather.wind_std_mps}

@@ -287,7 +287,6 @@ def extend(
     """The vessel with the effects of `ship`, and notes on those that it cannot hold, one sentence each.
 
     Args:
-        vessel: the model in use.
         ship: with effects found.
         std: standard errors of effects.
         estimated: effects, and the covariance (c, c) of their estimates.

@@ -37,7 +37,6 @@ def minimised(
     """Values and starts (W, n) of least cost.
 
     Args:
-        problem: to be solved.
         values, starts: to begin with.
         settled: expected decrease of the cost that ends the search, in squared standard deviations of the estimate.
         report: called at every step.

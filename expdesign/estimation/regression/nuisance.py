@@ -89,8 +89,6 @@ def nuisance_regressors(
     """The regressors that go with the named terms, without repetition.
 
     Args:
-        model: whose terms they are.
-        terms: parameter names.
         batches: one table of measured signals per batch, for the signs of moduli.
         wind_measured: air velocities are data; otherwise the unknown wind acts on them as the current on the water's.
         turning: a current is unknown, whose components change along the axes of a ship that turns.
@@ -223,7 +221,6 @@ def slopes(model: VesselModel, parameters: Array, table: Table, *, turning: bool
     """(2, k, n) change of accelerations over ground, in the model's own scale, with the current to north and to east.
 
     Args:
-        model: gives terms and outputs.
         parameters: (all,) of it.
         table: signals through water.
         turning: as of `simulation.motion_rates`.

@@ -58,7 +58,6 @@ def solve_iv(regression: Regression, instruments: Array, weighting: Weighting | 
     """Instrumental variables.
 
     Args:
-        regression: the data.
         instruments: (k, n, p), one instrument per parameter.
         weighting: how equations are formed; one block, no mean subtraction when left out.
 

@@ -177,7 +177,6 @@ def solvers(system: System, Z: Array, weighting: Weighting, *, exogenous: bool) 
     """A (p, p) for each batch, with theta = sum over batches of A sum Z y; none where the report finds no solution.
 
     Args:
-        system: the part.
         Z: (k, n, p) its instruments.
         weighting: how equations are formed.
         exogenous: the instruments are the regressors themselves.

@@ -165,7 +165,6 @@ def dictionary_files(
     """`<stem>.toml` and a CSV for each recorded primitive; reading them gives exactly the same requests.
 
     Args:
-        specs: requests.
         stem: of the file names.
         comments: lines to go first.
     """

@@ -128,7 +128,6 @@ def plan_json(
 
     Args:
         plan: verified.
-        scenario: its name.
         vessel: for name and particulars.
         environment: the forecast it was planned for.
         clearance_m: the required clearance [m].

@@ -113,7 +113,6 @@ def read_json(path: Path, kind: type[Kind], expected: str) -> Kind:
     """A file as a value.
 
     Args:
-        kind: its entries.
         expected: the kind of file in words, e.g. "a plan.json as expdesign run writes it".
 
     Raises:

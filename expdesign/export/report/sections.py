@@ -94,7 +94,6 @@ def report_sections(
     """All of them, in order.
 
     Args:
-        content: of the report.
         summary: the trial in a few sentences.
         assumptions: behind the numbers, each with its topic.
     """

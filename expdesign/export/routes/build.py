@@ -53,7 +53,6 @@ def build_route(
     """Cut the track into chords; every leg of the plan begins at a waypoint unless the ship stands still.
 
     Args:
-        track: the verified plan.
         tolerance_m: largest distance of the track from the chords [m]; by default a third of the clearance, but no
             more than half the beam.
         safe_water: where the chords may go, in (east, north), or None when the chart is not at hand; then they go
@@ -86,7 +85,6 @@ def build_bridge_route(
     has room for it, they are `CORRIDOR` ship lengths at least.
 
     Args:
-        track: the verified plan.
         safe_water: where the hull may be, in (east, north), or None when the chart is not at hand; then the track's
             fence is where the ship's centre may be.
         departure: time of the first waypoint, with its time zone.

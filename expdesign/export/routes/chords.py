@@ -258,7 +258,6 @@ def choose_stops(passage: Passage, samples: Sequence[int], *, fits: Fits) -> lis
     """The stops of the cheapest path from the first sample to the last.
 
     Args:
-        passage: the track.
         samples: where waypoints may be, ascending; between neighbours a straight leg is near enough to the track.
         fits: held against the legs of a path; a leg between neighbours stays even where it does not fit.
     """

@@ -47,7 +47,6 @@ def build_fence(
         points: (k, 2) track, north and east [m].
         water: allowed water in (east, north).
         clearance_m: that the plan keeps; it is what the fence may be simplified by.
-        frame: the plan's.
     """
     line = shapely.LineString(points[:, ::-1])
     west, south, east, north = line.bounds
@@ -128,7 +127,6 @@ def fit_route(
         points: (k, 2) track, north and east [m].
         groups: (arrival, departure) samples of each waypoint.
         places_deg: (n, 2) latitude and longitude of the waypoints as written.
-        frame: the plan's.
         water: where legs may go, in (east, north), or None.
     """
     places = frame.to_metres(places_deg)

@@ -126,7 +126,6 @@ def voyages(
     Args:
         model: whose inputs are wanted.
         vessel: model of the ship, whose terms give the moment of the drives where none is measured.
-        record: measured data.
         length_s: of a part [s]; what is left at the end of a batch is left out.
         finest_s: samples are averaged until they are as long [s].
 

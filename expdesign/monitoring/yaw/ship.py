@@ -79,7 +79,6 @@ def yaw_grams(
 
     Args:
         ship: the model with its values.
-        record: measured data.
         changes: watched for, of `yaw_changes`.
         begins_s: time of the first sample of each batch [s].
         stretch_s: length of a stretch [s].

@@ -93,7 +93,6 @@ def reposition_bound_s(
     """Least repositioning time of any plan of the class that the module describes [s].
 
     Args:
-        vessel, area, environment: as planned.
         clearance_m: distance of the hull from anything forbidden.
         ends: start and goal, (3,) or (2,).
         transit_mps, yaw_rate_radps: of legs through water; those whose ends are faster, by `leg_speed_mps`, or turn

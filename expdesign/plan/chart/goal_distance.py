@@ -72,7 +72,6 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
     """Clearance of every cell of a grid over the allowed water, by an exact distance transform.
 
     Args:
-        area: allowed water.
         resolution_m: desired spacing; coarser where the area would need more than `GRID_CELLS`.
     """
     return _clearance_field(area.water, grid_cell_m(area, resolution_m))

@@ -238,7 +238,6 @@ def _stepped(
     """Straight legs through water from where plans `able` (b,) end.
 
     Args:
-        plans: partial plans.
         able: those that are continued.
         q: the run.
         step: (m, 3) or (b, m, 3) ahead m, to starboard m, turn rad.

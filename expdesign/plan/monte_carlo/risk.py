@@ -188,7 +188,6 @@ def sail_trials(
 
     Args:
         water: vessel, forecast, area, and the water that paths keep to.
-        draws: number of trials.
         rng: of the first part; the streams of the others are spawned from it.
         progress: by the planned time of legs, or by parts where there are several.
     """

@@ -78,12 +78,10 @@ def place_runs(
     """Start poses of all runs in the order in which they are to be done.
 
     Args:
-        space: the primitives and the water.
         repeats: runs of each of the space's primitives.
         departure: where the search begins.
         width: partial plans kept.
         orders: of runs, of which the best plan is polished; 0 for none.
-        budget: counts the work.
         progress: told each run that is placed, and each order that is polished.
 
     Raises:

@@ -124,9 +124,7 @@ def build_lattice(lattice: Lattice, counts: Sequence[int], departure: Departure)
     """The lattice problem of a search space. Its last two poses are the start and the goal themselves.
 
     Args:
-        lattice: poses.
         counts: how often each of the space's runs is wanted.
-        departure: the start.
     """
     start, goal = lattice.size, lattice.size + 1
     moves = [*_straights(lattice), *_arcs(lattice), *_spot_turns(lattice)]

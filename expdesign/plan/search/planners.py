@@ -29,7 +29,6 @@ def placed_runs(
 
     Args:
         settings: with the planner, and what it takes.
-        space: the runs and the water.
         repeats: of each of the space's runs.
         departure: where the search begins.
 

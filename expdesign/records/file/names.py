@@ -248,7 +248,6 @@ def choose_columns(path: Path, header: tuple[str, ...], *, inputs: Inputs | None
     """The columns to read, by the contract's names, and notes on those that are converted or ignored.
 
     Args:
-        path: for messages.
         header: names in the file.
         inputs: what must be there, or None for all inputs in the file.
 

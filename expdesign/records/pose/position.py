@@ -38,7 +38,6 @@ def with_metres(table: Table, origin: LocalFrame | None) -> tuple[Table, LocalFr
     """Add north_m and east_m to a table that has latitudes and longitudes.
 
     Args:
-        table: a file.
         origin: of an earlier file's metres, or None to take this file's first position.
 
     Returns:
@@ -62,7 +61,6 @@ def with_continuous_angles(table: Table, limits: Mapping[str, Limit]) -> Table:
     ahead. One with limits of less than a turn has one angle between them for every direction.
 
     Args:
-        table: a file.
         limits: of columns, where they are known.
     """
     columns, notes = dict(table.columns), []

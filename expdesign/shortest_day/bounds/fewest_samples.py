@@ -206,7 +206,6 @@ def fewest_samples(
     """The fewest samples of any motion of a class that reach an accuracy.
 
     Args:
-        accuracy: to be reached.
         motions: the class.
         mean_subtraction: "none", "batch" or "complete".
         most_boxes: work limit of the proof; the bound holds with any.

@@ -349,7 +349,6 @@ def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, qui
     Args:
         state: with `held`.
         held: what failed.
-        why: in words.
         now: time [s].
         quiet: the next commands stand already, so that none are told.
     """

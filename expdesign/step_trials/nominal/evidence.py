@@ -128,9 +128,7 @@ def compared(
     """Distances in standard errors: of the plateaus in U, v and r, of the steps of throttle and rudder.
 
     Args:
-        model: the vessel's.
         theta: (p,) parameters to compare.
-        known: from the steps.
         late_s: (2,) errors of the dead times of throttle and rudder [s].
         form: (2,) relative errors of all time constants of throttle and rudder.
         to_mps: (records, 2) steady currents to north and east.

@@ -55,7 +55,6 @@ def posterior(model: VesselModel, known: Evidence, *, rounds: int = ROUNDS) -> t
 
     Args:
         model: the vessel's, with what is known before.
-        known: from the steps.
         rounds: of weights and parameters in turn.
 
     Raises:

@@ -332,7 +332,6 @@ def design_document(design: DurationDesign, compared: Sequence[Efficiencies] | N
     """What a document says of durations.
 
     Args:
-        design: the durations.
         compared: the design under every criterion, where tables are wanted: how long to run each primitive, every
             design under every criterion, and how limits are kept.
     """

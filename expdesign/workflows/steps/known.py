@@ -87,7 +87,6 @@ def combined(vessel: Vessel, estimate: Estimate, *, prior_counts: bool) -> Vesse
 
     Args:
         vessel: as known before; the standard deviations of parameters that were not estimated stay.
-        estimate: from the data.
         prior_counts: whether to combine it with values that have a stated standard deviation.
     """
     model = vessel.model

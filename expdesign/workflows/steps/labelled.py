@@ -61,7 +61,6 @@ def labelled_design(
         record: with delivered inputs.
         paths: the files it was read from.
         model: nominal; where all its parameters are zero, the least-squares estimate from all pieces stands for it.
-        parameters: names to estimate.
         predictor: "basic" or "basic-wind".
         asked: keep, draws, labels, mean and seed count.
         piece_s: length of a piece [s].
