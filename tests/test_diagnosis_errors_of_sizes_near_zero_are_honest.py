@@ -20,7 +20,10 @@ from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.vessel.quantities import EFFECTS
 
 WEATHER = sea.Weather(current_std=0.01, wind_std=0.2)
-LARGE = {"lag:all": 2.0, "delay:all": 2.0, "slew:rudder": 30.0, "deadband:rudder": 0.3, "shallow:damping": 1.0}
+LARGE = {
+    "lag:all": 2.0, "delay:all": 2.0, "lead:all": 2.0, "slew:rudder": 30.0, "deadband:rudder": 0.3,
+    "shallow:damping": 1.0,
+}  # fmt: skip
 """An effect of every kind that begins at zero, and a size that shows."""
 SMALL = {
     "lag:all": ({"lag_s": 0.3, "acts_on": 0b11}, 0.3),

@@ -95,8 +95,10 @@ def as_found(clean, cause: str):
 
 
 def test_every_cause_of_the_catalogue_is_tried():
-    """That of a rudder, which the tug does not have, in `test_diagnosis_simulations_and_vessel_files_are_exact`."""
-    assert {*EFFECTS, "actuator_scale"} == {cause.name for cause in CAUSES}
+    """But that of a rudder, which the tug lacks (`test_diagnosis_simulations_and_vessel_files_are_exact`), and orders
+    that are late, which no file holds (`test_diagnosis_orders_recorded_late_are_named`).
+    """
+    assert {*EFFECTS, "actuator_scale", "late_orders"} == {cause.name for cause in CAUSES}
 
 
 @pytest.mark.parametrize("cause", EFFECTS)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.accuracy import Dependence, dependence
-from expdesign.diagnosis.model import ExtendedModel, ahead_force, ahead_force_text, group_columns
+from expdesign.diagnosis.model import FOLLOWING, ExtendedModel, ahead_force, ahead_force_text, group_columns
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.export.document import Figure
 from expdesign.export.estimate_figures import AXES, thinned
@@ -56,7 +56,7 @@ def is_force(found: Diagnosis, item: Finding) -> bool:
 
 def has_sign(item: Finding) -> bool:
     """Whether the error changes its sign with the variable; otherwise only its size grows."""
-    return not item.keys[0].startswith(("slew:", "lag:", "delay:", "roll:", "change:"))
+    return item.keys[0].partition(":")[0] not in (*FOLLOWING, "roll", "change")
 
 
 def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) -> tuple[Array, str]:
@@ -100,7 +100,7 @@ def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
     """(w, s) values of the variable that an error depends on, at the compared samples, and their label."""
     key = item.keys[0]
     kind, _, rest = key.partition(":")
-    if kind in ("slew", "lag", "delay"):
+    if kind in FOLLOWING:
         inputs = extended_model(found.vessel, found.record).model.inputs
         return _since_change(found, group_columns(rest, inputs))
     if kind == "inertia" or key in ("late:u", "late:v", "late:r"):

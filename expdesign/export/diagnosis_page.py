@@ -69,6 +69,7 @@ OUTPUTS = {"u": "surge", "v": "sway", "r": "yaw", "psi": "heading"}
 PATTERNS = (
     (re.compile(r"lag_(\w+)_s"), "time constant of {}"),
     (re.compile(r"delay_(\w+)_s"), "dead time of {}"),
+    (re.compile(r"orders_late_(\w+)_s"), "delay of the recorded orders of {}"),
     (re.compile(r"deadband_(\w+?)(?:_rps|_rad)?"), "width of the dead band of {}"),
     (re.compile(r"angle_offset_(\w+)_rad"), "offset of {}"),
     (re.compile(r"angle_factor_(\w+)"), "acting angle over recorded angle of {}"),

@@ -373,6 +373,10 @@ OTHERS = (
         words="yaw moment per unit of ahead force: the thrust's line of action passes this far to port",
         result="thrust_offset_m", unit="m", matters=0.02, per="length",
     ),
+    Quantity(
+        stage=ACTUATORS, effects=("lead",), words="time by which inputs act before their recorded orders",
+        result="orders_late_{}_s", unit="s", low=0.0, high=60.0, matters=0.05, per="time",
+    ),
     _share(
         ACTUATORS, "scale", "share by which rudder angles exceed what is ordered, offset included", "angle_factor_{}",
         -0.8, 1.5, 0.1,

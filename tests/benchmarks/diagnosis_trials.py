@@ -178,8 +178,8 @@ def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: floa
     }[cause]
 
 
-NAMES = tuple(cause.name for cause in CAUSES if cause.name not in ("actuator_slew", "log_scale"))
-"""Causes that are hidden: all but a rate, which these files do not state, and a log's scale, which positions tell."""
+NAMES = tuple(cause.name for cause in CAUSES if cause.name not in ("actuator_slew", "late_orders", "log_scale"))
+"""Causes hidden: all but a rate, which no file here states, late orders, and the scale of a log, told by positions."""
 
 
 def drawn_ship(cause: str, rng: np.random.Generator, only: str | None) -> str:

@@ -19,6 +19,7 @@ from expdesign.diagnosis.causes.candidate import (
 from expdesign.diagnosis.model import (
     ADVANCE_LOSS,
     ANGLE_STEMS,
+    LEAST_EFFECT,
     ExtendedModel,
     ahead_force_text,
     group_columns,
@@ -154,7 +155,7 @@ ACTUATOR_DEADBAND = Cause(
 
 
 def _candidates_delay(situation: Situation) -> tuple[Candidate, ...]:
-    return followers(situation, "delay", "actuator_delay")
+    return () if situation.ship.has_found("lead:") else followers(situation, "delay", "actuator_delay")
 
 
 def _explain_delay(values: Values, _ship: ExtendedModel) -> str:
@@ -172,6 +173,43 @@ ACTUATOR_DELAY = Cause(
     summary="actuators that follow their commands after a dead time",
     candidates=_candidates_delay,
     explain=_explain_delay,
+)
+
+
+def _candidates_late_orders(situation: Situation) -> tuple[Candidate, ...]:
+    """Of inputs without a dead time: one that is stated and too long is a dead time to be found shorter, to zero."""
+    ship = situation.ship
+    delayed = {
+        column
+        for key, value in ship.effects.items()
+        if key.startswith("delay:") and value > LEAST_EFFECT
+        for column in group_columns(key.split(":", 1)[1], ship.model.inputs)
+    }
+    return tuple(
+        one
+        for one in followers(situation, "lead", "late_orders")
+        for key in one.free
+        if not delayed & {*group_columns(key.split(":", 1)[1], ship.model.inputs)}
+    )
+
+
+def _explain_late_orders(values: Values, _ship: ExtendedModel) -> str:
+    key, value, std = first(values)
+    group = key.split(":")[1]
+    return (
+        f"The ship answers before the orders that are recorded, which no actuator can: {group} orders are recorded "
+        f"{from_zero(value, std)} s late by the clock of the motion, or what is recorded is a reply that lags "
+        "behind what acts."
+    )
+
+
+LATE_ORDERS = Cause(
+    name="late_orders",
+    title="Orders recorded late",
+    missing="the delay of the recorded orders",
+    summary="a ship that answers before the recorded orders: their clock is behind that of the motion",
+    candidates=_candidates_late_orders,
+    explain=_explain_late_orders,
 )
 
 

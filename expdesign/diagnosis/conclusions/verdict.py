@@ -234,6 +234,8 @@ def _advice(findings: Sequence[Finding]) -> str:
         return "Correct the instruments; the extended vessel file describes them as they were"
     if causes[0] in WEATHER and (findings[0].keys or causes)[0].startswith(WEATHER):  # and not what measured wind does
         return "Use the extended vessel file for data in the same weather"
+    if causes[0] == "late_orders":
+        return "Set the clock of the orders, which no vessel file can, and diagnose again"
     if causes[0] == "change_point":
         return "Diagnose the data before and after the change separately"
     return "Use the extended vessel file, after a look at runs that it has not seen"

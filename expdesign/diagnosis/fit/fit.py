@@ -20,7 +20,7 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
-from expdesign.diagnosis.model import LEAST_EFFECT, ExtendedModel, resisting, term_factors
+from expdesign.diagnosis.model import FOLLOWING, LEAST_EFFECT, ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.values import Array
 from expdesign.vessel.quantities import TIME, acts_on, effect_row
@@ -35,7 +35,7 @@ FORCE_SPACING_S = 60.0  # between the knots of a force that nobody measured [s]
 FORCE_PENALTIES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
 
 
-POSITIVE = ("lag:", "delay:", "slew:")
+POSITIVE = tuple(f"{kind}:" for kind in FOLLOWING)
 """Effects that are times, from zero on."""
 LEAST_PIVOT = 1e-6
 """Of a matrix with a unit diagonal that counts as regular: the size of a direction beside all others."""
@@ -246,9 +246,9 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
     result = {}
     for key, value in effects.items():
         kind = key.split(":")[0]
-        if kind in ("lag", "delay", "slew", "deadband") or key in ("roll:period", "roll:damping"):
+        if kind in (*FOLLOWING, "deadband") or key in ("roll:period", "roll:damping"):
             before, ratio = ship.get(key), LARGEST_RATIO
-            least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
+            least = 0.0 if kind in FOLLOWING else before / ratio
             value = min(max(value, least, LEAST_EFFECT), max(before, 1e-3) * ratio)
         elif effect_row(key).neutral == 1.0 and not acts_on(key, TIME):
             value = max(value, SMALLEST_FACTOR_CHANGE)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, before_windows, linear_basis, random_current_precision, whitened
-from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.model import FOLLOWING, ExtendedModel
 from expdesign.diagnosis.motion import (
     Disturbance,
     LinearisedMotion,
@@ -146,7 +146,7 @@ def difference_step(ship: ExtendedModel, key: str) -> float:
     kind = key.split(":")[0]
     if kind in ("theta", "term"):
         return 1e-4 * max(1e-4, _parameter_scale(ship, key))
-    if kind in ("lag", "delay", "slew", "deadband"):
+    if kind in (*FOLLOWING, "deadband"):
         return max(0.05 * value, 1e-6)
     if kind == "roll":
         return max(1e-3 * value, 1e-6)

@@ -4,6 +4,7 @@ from expdesign.diagnosis.model.extended_model import ANGLE_STEMS, ROLL, Extended
 from expdesign.diagnosis.model.terms import (
     ADVANCE_LOSS,
     AIR,
+    FOLLOWING,
     LEAST_EFFECT,
     RESPONSES,
     Effects,

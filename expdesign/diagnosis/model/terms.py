@@ -391,6 +391,8 @@ RESPONSES = {row.effects[0]: row.key for row in rows_of(Response)}
 
 The effect of a slew rate is its inverse, the time that a change of one unit takes, so that zero changes nothing.
 """
+FOLLOWING = ("slew", "lag", "delay", "lead")
+"""Kinds of effects of a group of inputs that are times, from zero on."""
 LEAST_EFFECT = 1e-6
 """Size of such an effect that is taken for zero: derivatives by times are differences upward."""
 

@@ -32,7 +32,8 @@ FEW_STEPS, MOST_KNOWN = 10_000, 64  # integrator steps of windows whose forces a
 
 # Inputs as the actuators of an extended model deliver them.
 #
-# Slew rate, dead band, dead time, lag, offset and scale, in this order.
+# Slew rate, dead band, dead time, lag, offset and scale, in this order. Orders that are recorded late act before they
+# are recorded.
 
 
 def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tuple[Array, int]:
@@ -44,7 +45,7 @@ def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tupl
     """
     inputs = ship.model.inputs
     rows = _slewed(ship, rows, windows)
-    moving = any(key.startswith(("delay:", "lag:")) and value for key, value in ship.effects.items())
+    moving = any(key.startswith(("delay:", "lag:", "lead:")) and value for key, value in ship.effects.items())
     parts = -(-ACTUATOR_SUBSTEPS // windows.rows_per_step) if moving else 1
     delivered = np.repeat(rows, parts, axis=0)
     finer = parts * windows.rows_per_step
@@ -55,6 +56,12 @@ def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tupl
                 responses = (response,) * len(columns)
                 through = deliver(responses, delivered[:, columns], sample_time_s=windows.step_s / finer)
                 delivered[:, columns] = through[:, 0]
+    for key, value in ship.effects.items():
+        if key.startswith("lead:") and value > 0.0:  # a dead time in time that runs backward
+            columns = group_columns(key.split(":", 1)[1], inputs)
+            orders = (_response("delay_s", value),) * len(columns)
+            early = deliver(orders, delivered[::-1, columns], sample_time_s=windows.step_s / finer)
+            delivered[:, columns] = early[::-1, 0]
     return delivered * _scales(ship)[:, None], finer
 
 

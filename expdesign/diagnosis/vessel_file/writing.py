@@ -296,7 +296,8 @@ def extend(
     actuators, more = _actuators(model.actuators, ship)
     if "u" not in ship.derived and ship.get("late:u") != ship.get("late:v"):
         more = (*more, "The delay of u or v alone is written as one of the whole velocity sensor.")
-    if any(key.startswith("late:") and value < 0 for key, value in ship.effects.items()):
+    early = (key.startswith("late:") and value < 0 for key, value in ship.effects.items())
+    if any(early) or any(key.startswith("lead:") for key in ship.effects):
         more = (
             *more,
             "The vessel file leaves out a delay below zero, and its simulation gains nothing by that finding.",
