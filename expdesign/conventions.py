@@ -1,4 +1,4 @@
-"""Frames, signs, units and column names of the package, and how numbers with their errors are written.
+"""Frames, signs, units and column names of the package, and how numbers with their errors and lists are written.
 
 - n-frame: north, east, down, fixed to the earth; its origin is the reference point of the sea area.
 - b-frame: x forward, y starboard, z down; origin at the centre of rotation.
@@ -13,6 +13,7 @@ Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,3 +64,8 @@ def plus_minus(value: float, std: float) -> str:
         decimals = max(0, decimals + exponent)
         return f"({value / 10**exponent:.{decimals}f} {apart} {std / 10**exponent:.{decimals}f})e{exponent}"
     return f"{value:.{max(0, decimals)}f} {apart} {std:.{max(0, decimals)}f}"
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """A, B and C."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"

@@ -6,7 +6,7 @@ status 2 and `NoAnswer` into exit status 3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -80,10 +80,13 @@ class NotInformative(NoAnswer):
 
     Attributes:
         parameters: their names.
+        unseen: combinations of parameters that the data do not show at all, name -> share in the parameter's own unit.
     """
 
-    def __init__(self, message: str, *, parameters: tuple[str, ...] = ()) -> None:
-        self.parameters = parameters
+    def __init__(
+        self, message: str, *, parameters: tuple[str, ...] = (), unseen: tuple[Mapping[str, float], ...] = ()
+    ) -> None:
+        self.parameters, self.unseen = parameters, unseen
         super().__init__(message)
 
 

@@ -1,16 +1,23 @@
 """Estimates joined with what was known before: the information of both adds up, and a contradiction is told."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from expdesign import workflows
 from expdesign.assessment import EstimateOptions
-from expdesign.assessment.values import with_prior
-from expdesign.errors import InputError
+from expdesign.assessment.prior import held_for, released, with_prior
+from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.values import into_range
+from expdesign.export.files import vessel_toml
+from expdesign.scenario import load_vessel
+from expdesign.signals import Commands
 from expdesign.vessel import Term, VesselModel
+from measured_trials import held, write_run
 
+TWIN_SCREW = Path(__file__).parents[1] / "expdesign" / "templates" / "twin-screw" / "vessel.toml"
 NAMES = ("X_u", "X_abs_u_u")
 TERMS = (Term("u", "X_u", "u"), Term("u", "X_abs_u_u", "abs(u)*u"))
 
@@ -147,3 +154,77 @@ def test_what_runs_differ_by_widens_the_joined_estimate_and_leaves_its_values() 
         [np.concatenate([one.values - own.values, one.nuisance_values - own.nuisance_values]) for one in moved]
     ).T
     np.testing.assert_allclose(wider.joint_covariance - own.joint_covariance, A @ differ @ A.T, atol=1e-9)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part(Found):
+    """An estimate with some parameters held."""
+
+    held: dict[str, float]
+    nuisance_names: tuple[str, ...] = ("current",)
+
+    @property
+    def assignments(self) -> dict[str, float]:
+        return dict(zip(self.names, self.values.tolist(), strict=True)) | self.held
+
+
+@pytest.mark.parametrize("unseen", [(1.0, 0.0, 0.0), (3.0, -2.0, 0.0), (3.0, -2.0, 0.5)])
+def test_what_data_do_not_show_is_the_prior_s_and_the_rest_is_joined(unseen: tuple[float, float, float]) -> None:
+    """The posterior has the information of prior and data, of which the latter shows nothing along `unseen`."""
+    rng, along, prior = np.random.default_rng(4), np.array(unseen), np.diag([0.5**-2, 2.0**-2, 0.0])
+    seen = np.linalg.qr(np.column_stack([along, rng.normal(size=(3, 2))]))[0][:, 1:]
+    root = seen @ rng.normal(size=(2, 2))
+    information, truth = root @ root.T, np.array([0.5, 0.4, 0.1])
+    model = known([0.5, 2.0])
+    error = NotInformative("unseen", unseen=({"X_u": unseen[0], "X_abs_u_u": unseen[1], "current": unseen[2]},))
+    (fixed,) = held_for(error, model)
+    place = NAMES.index(fixed)
+    kept = [other for other in range(3) if other != place]
+    # data whose most likely numbers are the truth, or any along the combination: that with the held one at its prior
+    numbers = truth + along * (model.parameters[place] - truth[place]) / along[place]
+    covariance = np.linalg.inv(information[np.ix_(kept, kept)])
+    part = Part(
+        names=tuple(name for name in NAMES if name != fixed), values=numbers[kept[:1]], covariance=covariance[:1, :1],
+        nuisance_values=numbers[2:], joint_covariance=covariance, held={fixed: model.parameters[place]},
+    )  # fmt: skip
+    after = with_prior(released(part, error, model), model)
+    expected = np.linalg.inv(information + prior)
+    mean = expected @ (information @ truth + prior @ [0.3, -0.2, 0.0])
+    np.testing.assert_allclose(np.concatenate([after.values, after.nuisance_values]), mean, atol=2e-3)
+    np.testing.assert_allclose(after.joint_covariance, expected, atol=1e-3 * np.abs(expected).max())
+    assert fixed in after.warnings[0]
+
+
+@pytest.mark.thorough
+def test_twin_screws_that_are_ordered_together_are_estimated_with_a_prior(tmp_path: Path) -> None:
+    """What tells port from starboard stays as the card had it; without a prior the data are refused."""
+    truth = load_vessel(TWIN_SCREW)
+    rng = np.random.default_rng(0)
+    shafts, helms = 3.0 + 0.8 * held(rng, 800), 0.5 * held(rng, 800)
+    columns = {"n1": shafts, "n2": shafts, "rudder1": helms, "rudder2": helms}
+    values = np.stack([columns.get(name, 0.0 * shafts) for name in truth.model.inputs], axis=1)
+    commands = Commands(sample_time_s=truth.sample_time_s, names=truth.model.inputs, values=values)
+    path = write_run(tmp_path / "run.csv", truth, commands, velocity=(4.0, 0.0, 0.0))
+    model = truth.model
+    guess = replace(
+        truth,
+        model=replace(
+            model,
+            parameters=1.1 * model.parameters,
+            parameter_std=0.2 * np.abs(model.parameters),
+            parameter_correlation={},
+        ),
+    )
+    (tmp_path / "guess.toml").write_text(vessel_toml(guess))
+    ask = {"vessel": tmp_path / "guess.toml", "methods": ("ls",)}
+    with pytest.raises(NotInformative, match="X_T2"):
+        workflows.estimate([path], tmp_path / "none", **ask)
+    workflows.estimate([path], tmp_path / "joined", prior="parameter_std", **ask)
+    after = load_vessel(tmp_path / "joined" / "vessel-estimated.toml").model
+    apart = (after.parameters - model.parameters) / after.parameter_std
+    assert np.abs(apart).max() < 4.0
+    std, place = after.parameter_std / np.abs(model.parameters), model.names.index
+    assert std[place("X_T1")] > 0.1
+    joint = after.parameter_covariance[np.ix_(*[[place("X_T1"), place("X_T2")]] * 2)].sum() ** 0.5
+    assert joint < 0.05 * 2 * model.parameters[place("X_T1")]
+    assert "X_T2" in (tmp_path / "joined" / "estimate.json").read_text()

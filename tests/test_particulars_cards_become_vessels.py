@@ -13,11 +13,13 @@ import pytest
 from expdesign.cli import main
 from expdesign.export.files import vessel_toml
 from expdesign.indices import standard_results
-from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, nominal
+from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, assumed, nominal
 from expdesign.particulars.fit import Problem, fitted
+from expdesign.particulars.forces import propellers
 from expdesign.particulars.model import SAMPLES, STEERING, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_card, load_vessel
+from expdesign.scenario.card_file import RudderTable, ThrusterTable
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -307,3 +309,50 @@ def test_drawn_ships_are_steered_to_the_side_of_the_nominal_one_and_sampled_some
         assert (drawn[:, index] * model.parameters[index] >= 0.0).all()
     samples = ship.length_m / COASTER.top_speed_mps / ship.sample_time_s
     assert SAMPLES / 2 < samples < 2 * SAMPLES
+
+
+GIVEN_OTHERWISE = {"starboard_m", "area_m2", "area_percent"}
+"""Keys of rudders whose absence is no number: the centre line, and what another key gives."""
+LEAST = SHIP + "block_coefficient = 0.7\ntop_speed_kn = 12.0\n" + "".join(
+    SCREW.replace("propeller", kind) for kind in ("propeller", "azimuth", "podded", "tunnel")
+) + "[[rudders]]\nforward_m = -39.0\narea_percent = 2.0\n"  # fmt: skip
+
+
+def test_every_key_that_a_card_leaves_out_is_told_with_what_stands_for_it(tmp_path: Path) -> None:
+    path = tmp_path / "card.toml"
+    path.write_text(LEAST)
+    card = load_card(path)
+    told = {one.key: one.value for one in assumed(card, propellers(card))}
+    turning = {"turn_max_deg", "turn_degps"}
+    for number, thruster in enumerate(card.thrusters, start=1):
+        keys = {key for key, field in ThrusterTable.model_fields.items() if not field.is_required()}
+        keys -= {"starboard_m"} | (set() if thruster.kind in ("azimuth", "podded") else turning)
+        keys -= {"power_kw"} if thruster.drives else {"astern_percent", "pitch_ratio"}
+        assert {key for key in told if key.startswith(f"thrusters[{number}]")} == {
+            f"thrusters[{number}].{key}" for key in keys
+        }
+    keys = {key for key, field in RudderTable.model_fields.items() if not field.is_required()} - GIVEN_OTHERWISE
+    assert {key for key in told if key.startswith("rudders")} == {f"rudders[1].{key}" for key in keys}
+
+    stated = "".join(f"{key.partition('.')[2]} = {value}\n" for key, value in told.items() if key.startswith("rudders"))
+    path.write_text(LEAST + stated)
+    again = load_card(path)
+    assert again.rudders == card.rudders
+    assert not [one for one in assumed(again, propellers(again)) if one.key.startswith("rudders")]
+
+
+def test_the_vessel_file_and_the_page_say_what_is_assumed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "card.toml"
+    path.write_text(LEAST)
+    assert main(["nominal", str(path), "--out", str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr().out
+    for text in (
+        shown,
+        (tmp_path / "out" / "vessel.toml").read_text(),
+        (tmp_path / "out" / "nominal.html").read_text(),
+    ):
+        assert "rudders[1].rate_degps" in text
+        assert "thrusters[2].turn_degps" in text
+    assert json.loads((tmp_path / "out" / "nominal.json").read_text())["assumed"]["rudders[1].rate_degps"] == (
+        pytest.approx(2.32)
+    )

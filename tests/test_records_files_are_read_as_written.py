@@ -323,6 +323,15 @@ def test_an_input_is_idle_where_no_file_moves_it(
     assert load_records(paths).notes == (idle,) * told
 
 
+def test_inputs_that_stand_at_one_value_are_told_in_one_note(tmp_path: Path) -> None:
+    data = motion()
+    idle = dict.fromkeys(("n2_rps", "n3_rps", "rudder1_rad"), 0 * data["u_mps"]) | {"n4_rps": 0 * data["u_mps"] + 2}
+    assert loaded(tmp_path, data | idle).notes == (
+        "trial.csv: rudder1_rad, n2_rps and n3_rps are 0 in all rows, so their effects cannot be estimated",
+        "trial.csv: n4_rps is 2 in all rows, so how its effect depends on it cannot be estimated",
+    )
+
+
 def test_held_positions_are_noted(tmp_path: Path) -> None:
     data = motion()
     held = np.arange(80) // 5 * 5

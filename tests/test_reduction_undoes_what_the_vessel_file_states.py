@@ -181,6 +181,15 @@ def test_what_a_recorded_input_is_taken_for_is_told_of_those_that_move(speed: Re
     assert ("; dead times, lags and dead bands still act." in taken) == still
 
 
+def test_inputs_that_follow_at_one_rate_are_told_in_one_note():
+    slow = ship(Response(rate=0.5), Response(rate=0.1))
+    told = [note for note in reduced(Record(batches=(sailed(slow),)), slow).notes if "followed at" in note]
+    assert told == [
+        "n1_rps and n2_rps are taken for commands; they are followed at 0.5 rps2, as the vessel file states.",
+        "a1_rad and a2_rad are taken for commands; they are followed at 0.1 radps, as the vessel file states.",
+    ]
+
+
 def test_a_signal_between_readings_is_within_the_stated_error():
     """3/128 h**4 max|d4x/dt4| inside, 1/24 of it at the ends, for a delay that is no whole number of samples."""
     for omega, delay, interval in ((0.3, 0.5, 0.0), (0.2, 2.3, 0.0), (0.1, 1.7, 3.0), (0.1, 0.0, 2.5)):

@@ -17,6 +17,7 @@ from expdesign.assessment.actuator_times import (
 )
 from expdesign.assessment.held_out import HeldOut, ranked
 from expdesign.assessment.misfit import AHEAD_S, ESTIMATION, TEST, Limits, check_run, decomposed, one_step
+from expdesign.assessment.prior import PARAMETER_STD, check_prior, with_prior
 from expdesign.assessment.trials import (
     Trial,
     Work,
@@ -31,13 +32,10 @@ from expdesign.assessment.unstated import answers, current
 from expdesign.assessment.values import (
     CONTINUOUS,
     HELD_OUT,
-    PARAMETER_STD,
     Assessed,
     Assessment,
     Disturbances,
     EstimateOptions,
-    check_prior,
-    with_prior,
 )
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind, tells_current

@@ -9,15 +9,8 @@ from functools import cached_property
 from expdesign.assessment.actuator_times import considered, known_times
 from expdesign.assessment.held_out import Candidate, Found, HeldOut, held_out
 from expdesign.assessment.misfit import AHEAD_S
-from expdesign.assessment.values import (
-    AUTO,
-    CONTINUOUS,
-    HELD_OUT,
-    NONE,
-    PARAMETER_STD,
-    EstimateOptions,
-    with_prior,
-)
+from expdesign.assessment.prior import NONE, PARAMETER_STD, held_for, released, with_prior
+from expdesign.assessment.values import AUTO, CONTINUOUS, HELD_OUT, EstimateOptions
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative
 from expdesign.estimation.disturbance import steady_current
 from expdesign.estimation.excitation import worst_case
@@ -239,6 +232,8 @@ def attempted(
 ) -> Estimate:
     """One estimate of a vessel from a record; errors as of `assess`.
 
+    What the data do not show is held at the vessel's values where a prior is to be joined, see `released`.
+
     Args:
         vessel: whose values it starts from.
         start: of the first instruments.
@@ -261,9 +256,21 @@ def attempted(
         worst=worst_case(vessel.sensors, current_mps=options.offset_mps, wind_mps=options.offset_mps),
         times=times,
         sensors=vessel.sensors,
-        begun=begun,
     )
-    return estimate(record, vessel.model, method=method.name, settings=settings, progress=progress)
+
+    def asked(held: tuple[str, ...]) -> Estimate:
+        free = [name for name in vessel.model.names if name not in options.fixed]
+        going = begun and replace(begun, values=begun.values[[name not in held for name in free]])
+        own = replace(settings, fixed=(*options.fixed, *held), begun=going)
+        return estimate(record, vessel.model, method=method.name, settings=own, progress=progress)
+
+    try:
+        return asked(())
+    except NotInformative as error:
+        held = held_for(error, vessel.model) if options.prior == PARAMETER_STD and error.unseen else ()
+        if not held:
+            raise
+        return released(asked(held), error, vessel.model)
 
 
 def _noted(found: Estimate, why: str) -> Estimate:

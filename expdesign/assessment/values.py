@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-
-import numpy as np
-import scipy
+from dataclasses import dataclass
 
 from expdesign.assessment.held_out import HeldOut, reason
 from expdesign.assessment.misfit import Limits, OneStep, RunCheck
+from expdesign.assessment.prior import NONE, PARAMETER_STD, PRIORS
 from expdesign.assessment.unstated import Answer, Current
 from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.estimation.disturbance import MeasuredWind, Moments
@@ -19,7 +17,7 @@ from expdesign.estimation.methods import Method
 from expdesign.estimation.regression import MEANS
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import BLOCKS
-from expdesign.estimation.values import Estimate, into_range
+from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import VesselModel
@@ -102,85 +100,6 @@ class Assessment:
     def best(self) -> Assessed:
         """The estimate that goes into the vessel file."""
         return self.methods[self.chosen]
-
-
-# An estimate together with what the vessel file knew before the data.
-#
-# Values and covariances of both, independent of each other, are joined by their information; in gain form, for nuisance
-# parameters too:
-#
-#     K = C_: (C + P)^-1          x + K (theta_0 - theta)          C_:: - K C_:'
-#
-# with the estimate theta and covariance C of the parameters, all numbers x and their covariance C_::, columns C_: of
-# the parameters, and the prior theta_0 with P. Values outside the ranges that the file states move to the most probable
-# ones theta' within, and all others by x + C_: C^-1 (theta' - theta).
-#
-# What runs differ by does not act on the gain: a prior by regressions lacks the same terms, and is as sure of its form.
-# It adds to the covariance of what is joined, as far as that follows the data.
-#
-# Source: A. Gelb (ed.), Applied Optimal Estimation (1974), 4.2.
-
-NONE, PARAMETER_STD = "none", "parameter_std"
-PRIORS = (NONE, PARAMETER_STD)
-CONTRADICTED = 0.01
-"""Probability of the distance between prior and estimate below which a warning says that they contradict each other."""
-
-
-def check_prior(model: VesselModel, name: str) -> None:
-    """Raise where a vessel file knows nothing before.
-
-    Raises:
-        InputError: it states no standard deviations.
-    """
-    if not model.parameter_std.any():
-        raise InputError(
-            f"vessel {name!r} states no [model.parameter_std], so it has no prior to join with: leave --prior out, or "
-            "state how well each parameter is known"
-        )
-
-
-def with_prior(found: Estimate, model: VesselModel) -> Estimate:
-    """An estimate joined with the normal prior of a model and the ranges of its parameters.
-
-    Parameters without standard deviation count as known.
-    """
-    places, count = [model.names.index(name) for name in found.names], len(found.names)
-    prior = model.parameter_covariance[np.ix_(places, places)]
-    apart = model.parameters[places] - found.values
-    noise = found.joint_covariance - found.between_runs
-    gain = np.linalg.solve(noise[:count, :count] + prior, noise[:count]).T
-    kept = np.eye(len(noise))
-    kept[:, :count] -= gain  # what of an error of the data stays
-    joint = noise - gain @ noise[:count] + kept @ (found.joint_covariance - noise) @ kept.T
-    joint = (joint + joint.T) / 2
-    distance = float(apart @ np.linalg.solve(found.covariance + prior, apart))
-    chance = float(scipy.special.chdtrc(count, distance))
-    warnings = found.warnings
-    if chance < CONTRADICTED:
-        scores = np.abs(apart) / np.sqrt(np.diag(found.covariance + prior))
-        worst = int(scores.argmax())
-        warnings = (
-            *warnings,
-            f"The data contradict the prior of the vessel file (chance {chance:.1g}), most in {found.names[worst]}: "
-            f"{scores[worst]:.1f} standard deviations. Estimates without --prior do not depend on it.",
-        )
-    values = np.concatenate([found.values, found.nuisance_values]) + gain @ apart
-    ends = [model.parameter_range.get(name, (-np.inf, np.inf)) for name in found.names]
-    inside = into_range(values[:count], joint[:count, :count], ends)
-    beyond = [name for name, old, (low, high) in zip(found.names, values, ends, strict=False) if not low <= old <= high]
-    if beyond:
-        values = values + joint[:, :count] @ np.linalg.pinv(joint[:count, :count], hermitian=True) @ (
-            inside - values[:count]
-        )
-        warnings = (*warnings, f"Held at the end of the range that the vessel file states: {', '.join(beyond)}.")
-    return replace(
-        found,
-        values=values[:count],
-        covariance=joint[:count, :count],
-        nuisance_values=values[count:],
-        joint_covariance=joint,
-        warnings=warnings,
-    )
 
 
 AUTO = "auto"

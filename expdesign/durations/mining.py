@@ -165,7 +165,7 @@ def require_told_apart(problem: DurationProblem, samples: Array) -> None:
     size = np.sqrt(np.abs(np.diag(total)[:p]))
     size[size == 0] = 1.0
     found = null_space(
-        moment / np.outer(size, size), problem.parameters, samples=int(samples.sum()), exogenous=problem.symmetric
+        moment / np.outer(size, size), problem.parameters, size, samples=int(samples.sum()), exogenous=problem.symmetric
     )
     require_informative(found)
 

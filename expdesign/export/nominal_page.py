@@ -8,10 +8,11 @@ from expdesign import __version__
 from expdesign.export.document import Document, Table, notes_of, section
 from expdesign.export.files import finite, strict_json, vessel_toml
 from expdesign.export.words import ship
-from expdesign.particulars import Nominal, Predicted, Trial, is_usual, shown
+from expdesign.particulars import Assumed, Nominal, Predicted, Trial, assumed, is_usual, shown
 
 TRIAL_HEADER = ("Trial", "Result", "Predicted", "95 % from", "To", "Stated", "From particulars alone")
 FACTOR_HEADER = ("Part of the forces", "Source", "Scatter before", "Times", "Scatter after")
+ASSUMED_HEADER = ("Not in the card", "Assumed", "Because")
 TAKEN_HEADER = ("Thruster", "Diameter", "Full order", "Pitch ratio", "Wake", "Thrust deduction")
 RESULTS = {
     "speed_mps": "speed",
@@ -49,6 +50,17 @@ UNUSUAL = (
 )
 PLANING = "wave-making and planing are not in the regressions, state speeds at several orders."
 HUMP = 0.45
+
+
+ASSUMED = (
+    "The card does not state these, so that they are the program's, not the ship's. State what is known: plans ask of "
+    "her what limits and rates allow."
+)
+
+
+def _given(one: Assumed) -> str:
+    """A value in the unit of its key."""
+    return f"{one.value:.4g}" if math.isfinite(one.value) else "no limit"
 
 
 def nominal_notes(found: Nominal) -> tuple[str, ...]:
@@ -115,6 +127,7 @@ def nominal_json(found: Nominal, command: str) -> str:
                 for one in found.found
             },
             "contradictions": list(found.contradictions),
+            "assumed": {one.key: finite(one.value) for one in assumed(found.card, found.driving)},
             "notes": list(nominal_notes(found)),
         }
     )  # fmt: skip
@@ -127,7 +140,9 @@ def nominal_toml(found: Nominal, command: str) -> str:
         "Forces from particulars by published formulas; each part times what the card's trial values make of it:",
         *(f"  {one.name}: times {one.value:.3f}, {100 * one.std_log_after:.0f} %; {one.source}" for one in found.found),
     )
-    return vessel_toml(found.vessel, comments=(*head, *nominal_notes(found)))
+    taken = [f"  {one.key} = {_given(one)}: {one.source}" for one in assumed(found.card, found.driving)]
+    told = ("Assumed, as the card does not state it:", *taken) if taken else ()
+    return vessel_toml(found.vessel, comments=(*head, *told, *nominal_notes(found)))
 
 
 def nominal_document(found: Nominal) -> Document:
@@ -143,6 +158,7 @@ def nominal_document(found: Nominal) -> Document:
         )
         for one in found.driving
     ]  # fmt: skip
+    rows = [(one.key, _given(one), one.source) for one in assumed(found.card, found.driving)]
     return Document(
         kind="Nominal vessel, from particulars and stated trials",
         title=found.vessel.name,
@@ -162,6 +178,7 @@ def nominal_document(found: Nominal) -> Document:
                 "is one standard deviation.",
             ),
             section("Thrusters that drive her", Table(header=TAKEN_HEADER, rows=taken, texts=1)),
+            *([section("What is assumed", Table(header=ASSUMED_HEADER, rows=rows, texts=3), ASSUMED)] if rows else []),
             section(
                 "Her trials",
                 Table(header=TRIAL_HEADER, rows=[_trial_row(one) for one in found.predicted], texts=2),

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
+    from expdesign.particulars.assumptions import Assumed, assumed
     from expdesign.particulars.card import (
         SCATTER,
         WATER_KGPM3,

@@ -128,6 +128,7 @@ class Card:
     windage: Windage | None = None
     top_speed_mps: float | None = None  # at full order ahead
     stated: tuple[Stated, ...] = field(default=())
+    silent: tuple[str, ...] = ()  # keys that it leaves out, "rudders[1].rate_degps", where others stand for them
 
     @property
     def drives(self) -> tuple[Thruster, ...]:

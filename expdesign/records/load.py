@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.conventions import OUTPUTS, POSE_COLUMNS
+from expdesign.conventions import OUTPUTS, POSE_COLUMNS, listed
 from expdesign.errors import FileError, InputError, UnknownName
 from expdesign.records.file import (
     FIRST_ROW,
@@ -198,7 +198,7 @@ def load_records(
     whose, origin, limits = "the vessel", None, column_limits(actuators)
     batches: list[Batch] = []
     notes: dict[str, list[str]] = {}
-    stands: dict[str, set[str]] = {}  # column of an input -> what it is in files, "" where it moves
+    stands: dict[str, set[tuple[str, str]]] = {}  # column of an input -> its name and value in files, "" where it moves
     for path, name in files.items():
         table, origin = _read(path, inputs, origin, limits)
         clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
@@ -210,21 +210,28 @@ def load_records(
         for note in remarks:
             notes.setdefault(note, []).append(name)
         for column in table.inputs:
-            stands.setdefault(column, set()).add(_idle(table, column))
-    for values in stands.values():
-        if values != {""} and len(values) == 1:  # another file may tell what one does not
-            notes[values.pop()] = list(files.values())
+            stands.setdefault(column, set()).add(_standing(table, column))
+    idle: dict[str, list[str]] = {}  # value -> inputs that have it in all rows
+    for levels in stands.values():
+        (header, value), *others = levels
+        if header and not others:  # another file may tell what one does not
+            idle.setdefault(value, []).append(header)
+    notes |= {_idle_note(headers, value): list(files.values()) for value, headers in idle.items()}
     return Record(batches=tuple(batches), notes=tuple(f"{_listed(names)}: {note}" for note, names in notes.items()))
 
 
-def _idle(table: Table, column: str) -> str:
-    """What cannot be learnt of an input that never moves, or "" where it does."""
+def _standing(table: Table, column: str) -> tuple[str, str]:
+    """Name and value of an input that never moves, both empty where it does."""
     used = REACHED + column if REACHED + column in table.columns else column  # as `_inputs` takes it
-    if np.ptp(table.columns[used]) > 0:
-        return ""
+    return ("", "") if np.ptp(table.columns[used]) > 0 else (table.sources[used].header, table.value(used, 0))
+
+
+def _idle_note(names: list[str], value: str) -> str:
+    """What cannot be learnt of inputs that never move."""
+    effect, depend, them = ("its effect", "depends", "it") if len(names) == 1 else ("their effects", "depend", "them")
     # a propeller at one speed still bears on a rudder behind it, and drives the ship
-    lost = "how its effect depends on it" if table.columns[used].any() else "its effect"
-    return f"{table.sources[used].header} is {table.value(used, 0)} in all rows, so {lost} cannot be estimated"
+    lost = f"how {effect} {depend} on {them}" if float(value) else effect
+    return f"{listed(names)} {'is' if len(names) == 1 else 'are'} {value} in all rows, so {lost} cannot be estimated"
 
 
 def _listed(names: list[str]) -> str:

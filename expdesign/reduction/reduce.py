@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import OUTPUTS, listed
 from expdesign.errors import InputError
 from expdesign.reduction.sensors import Stated, measured, shrinkage, turned, undone
 from expdesign.reduction.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
@@ -311,6 +311,7 @@ def with_delivered_inputs(
 
 def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[str]:
     """What the recorded values of signals with slew rates are taken for."""
+    commands: dict[str, list[str]] = {}  # rate -> columns that are followed at it
     for name, response in responses.items():
         if name in record.batches[0].reached:
             yield f"reached_{column_name(name)} is used as measured; no rate, dead time, lag or dead band acts on it."
@@ -321,7 +322,7 @@ def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[s
             if not kept:
                 continue  # what never moves may be either
             if not any(kept):
-                yield f"{column} is taken for the command; it is followed at {rate}, as the vessel file states."
+                commands.setdefault(rate, []).append(column)
             else:
                 where = (
                     "" if all(kept) else f" in {sum(kept)} of {len(kept)} batches, and for the command in the others"
@@ -331,6 +332,12 @@ def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[s
                     f"{column} changes no faster than {rate}, the stated rate, and is taken for the position{where}"
                     f"{still}. A position that was measured is best named reached_{column}."
                 )
+    for rate, columns in commands.items():
+        one = len(columns) == 1
+        yield (
+            f"{listed(columns)} {'is taken for the command; it is' if one else 'are taken for commands; they are'} "
+            f"followed at {rate}, as the vessel file states."
+        )
 
 
 def _delivered(

@@ -213,7 +213,16 @@ def load_card(path: Path | str) -> Card:
     )  # fmt: skip
     if not card.drives:
         raise entry.at("thrusters").error("has only tunnel thrusters, expected one that drives her ahead")
-    return replace(card, stated=tuple(_stated(file, entry)))
+    return replace(card, stated=tuple(_stated(file, entry)), silent=tuple(_silent(file)))
+
+
+def _silent(file: CardFile) -> Iterator[str]:
+    """Keys of thrusters and rudders that the file leaves out."""
+    for kind, tables in (("thrusters", file.thrusters), ("rudders", file.rudders)):
+        for number, table in enumerate(tables, start=1):
+            yield from (
+                f"{kind}[{number}].{key}" for key in type(table).model_fields if key not in table.model_fields_set
+            )
 
 
 def _check_place(forward_m: float, starboard_m: float, ship: ShipTable, entry: Entry) -> None:

@@ -59,7 +59,8 @@ class Outcome:
     ship: str
     plan: str  # verified or not, and how long, or why not
     prior: str  # joined with the estimate, "none" where the data alone tell enough
-    inside: int  # trial values of the published model in the 95 % intervals of the estimated vessel
+    known: int  # trial values of the published model in the 95 % intervals of the card's vessel
+    inside: int  # the same of the estimated vessel
     values: int
     error: float  # median of the sizes of logarithms of predicted by true
     before: float  # the same of the vessel of particulars
@@ -216,15 +217,16 @@ def outcome(
         np.savetxt(data[-1], np.array(list(columns.values())).T, "%.9g", ",", header=",".join(columns), comments="")
     second = [name for name in of_second_side(files.vessel) if not name.endswith("_astern")]
     common = [*map(str, data), "--vessel", str(folder / "vessel-ahead.toml"), "--quiet"]
-    error, before, joined = math.nan, math.nan, ""
+    error, joined = math.nan, ""
     inside = np.array([], dtype=bool)
+    errors, known = deviations(files.vessel, one.values)
+    before = float(np.median(np.abs(errors)))
     # the data alone, or what the card says beside them where these say too little
     for prior in ("none", "parameter_std"):
         asked = ["--prior", prior, "--method", *methods, "--out", str(folder / "estimate")]
         asked += ["--fixed", *second] if second else []
         if expdesign(["estimate", *common, *asked]) != 0:
             continue
-        before = float(np.median(np.abs(deviations(files.vessel, one.values)[0])))
         with suppress(InputError):  # hardly any ship that the estimate draws brakes, or steers to the right side
             errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
             error, joined = float(np.median(np.abs(errors))), prior
@@ -237,8 +239,8 @@ def outcome(
     if diagnosed and status == 0:
         said = str(json.loads((folder / "diagnosis" / "diagnosis.json").read_text("utf-8"))["verdict"])
     return Outcome(
-        ship=name, plan=plan, prior=joined, inside=int(inside.sum()), values=len(inside), error=error, before=before,
-        said=said, seconds=time.process_time() - began,
+        ship=name, plan=plan, prior=joined, known=int(known.sum()), inside=int(inside.sum()), values=len(inside),
+        error=error, before=before, said=said, seconds=time.process_time() - began,
     )  # fmt: skip
 
 
@@ -248,15 +250,16 @@ def main() -> None:
     parser.add_argument("--unplanned", action="store_true", help="sail every candidate once, without a plan")
     parser.add_argument("--draft", action="store_true", help="sail the runs of a plan that is not verified")
     asked = parser.parse_args()
-    print("| ship | plan | in 95 % | median error: particulars | estimate | diagnosis | processor |")
-    print("|---|---|---|---|---|---|---|")
+    print("| ship | plan | in 95 %: card | estimate | median error: card | estimate | diagnosis | processor |")
+    print("|---|---|---|---|---|---|---|---|")
     for name in asked.ships:
         with tempfile.TemporaryDirectory() as folder:
             options = ["--jobs", "1", *(["--draft"] if asked.draft else [])]  # so that all work is counted
             row = outcome(name, Path(folder) / name, planned=not asked.unplanned, options=options)
         share = f"{row.inside} of {row.values}{' (prior)' * (row.prior == 'parameter_std')}" if row.values else "-"
         errors = f"{math.expm1(row.before):.0%} | {math.expm1(row.error):.0%}" if row.values else "- | -"
-        print(f"| {name} | {row.plan} | {share} | {errors} | {row.said} | {row.seconds:.0f} s |", flush=True)
+        cells = f"{row.plan} | {row.known} | {share} | {errors} | {row.said}"
+        print(f"| {name} | {cells} | {row.seconds:.0f} s |", flush=True)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.conventions import plus_minus
+from expdesign.conventions import listed, plus_minus
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, SENSOR_CAUSES
 from expdesign.diagnosis.data import Windows
@@ -339,11 +339,6 @@ def accuracy_in_words(found: Accuracy) -> str:
 def has_diverged(found: Accuracy) -> bool:
     """Whether the simulation of some output has diverged from the ship."""
     return bool((found.fit < DIVERGED_FIT).any())
-
-
-def listed(words: Sequence[str], last: str = "and") -> str:
-    """A, B and C."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
 def _percent(share: float) -> str:

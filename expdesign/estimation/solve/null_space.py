@@ -8,7 +8,8 @@ vectors, so that the sentences stay short.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -30,6 +31,7 @@ class Direction:
     parameters: tuple[str, ...]  # names, largest weight first
     weights: Array  # one per name, in units of each parameter's effect on the data; squares sum to about 1
     strength: float  # singular value of the scaled moment matrix along it, relative to the largest of its equation
+    change: Mapping[str, float]  # name -> how far it goes in the parameter's own unit, of all parameters
 
     def __str__(self) -> str:
         pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[:NAMED_PARAMETERS]
@@ -49,29 +51,48 @@ class NullSpace:
     faint: tuple[Direction, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Axes:
+    """Parameters, and the norms (p,) of their regressors by which moments are scaled."""
+
+    names: tuple[str, ...]
+    size: Array  # infinite for those without variation
+
+    def direction(self, vector: Array, strength: float) -> Direction:
+        order = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SMALL_WEIGHT]
+        signed = vector * np.sign(vector[order[0]])
+        change = signed / np.where(np.isfinite(self.size), self.size, 1.0)
+        return Direction(
+            parameters=tuple(self.names[i] for i in order), weights=signed[order], strength=strength,
+            change=dict(zip(self.names, change.tolist(), strict=True)),
+        )  # fmt: skip
+
+
 def null_space(
-    moment: Array, names: tuple[str, ...], *, samples: int, exogenous: bool, second: Second | None = None
+    moment: Array, names: tuple[str, ...], size: Array, *, samples: int, exogenous: bool, second: Second | None = None
 ) -> NullSpace:
     """The report on the scaled moment matrix (q, p) of parameters that share outputs.
 
     Args:
         moment: instruments against regressors, each scaled to unit norm over the data (columns without variation zero).
         names: of the p parameters.
+        size: (p,) those norms; infinite without variation.
         samples: number of rows behind the moments.
         exogenous: the instruments are the regressors themselves.
         second: second moments (q, q) of instruments and (p, p) of regressors, scaled alike, to find what is weakly
             instrumented; without them nothing is.
     """
+    axes = _Axes(names, size)
     sizes, rows = _right_vectors(moment)
     top = max(float(sizes[0]), 1e-300)
     dark = sizes <= UNSEEN * top
-    unseen = [_direction(names, vector, 0.0) for vector in _sparse(rows[dark])]
+    unseen = [axes.direction(vector, 0.0) for vector in _sparse(rows[dark])]
     faint: list[Direction] = []
     if exogenous:
         weak = ~dark & (sizes <= FAINT * top)
-        faint = [_direction(names, row, float(size / top)) for size, row in zip(sizes[weak], rows[weak], strict=True)]
+        faint = [axes.direction(row, float(value / top)) for value, row in zip(sizes[weak], rows[weak], strict=True)]
     elif second is not None and not dark.any():
-        faint = _weak(moment, second, names, samples)
+        faint = _weak(moment, second, axes, samples)
     return NullSpace(singular_values=sizes / top, unseen=tuple(unseen), faint=tuple(faint))
 
 
@@ -87,7 +108,7 @@ def joined(parts: Sequence[NullSpace]) -> NullSpace:
 Second = tuple[Array, Array]
 
 
-def _weak(G: Array, second: Second, names: tuple[str, ...], samples: int) -> list[Direction]:
+def _weak(G: Array, second: Second, axes: _Axes, samples: int) -> list[Direction]:
     """Combinations whose regressor the instruments explain hardly better than chance would.
 
     Source: J. G. Cragg and S. G. Donald, Econometric Theory 9 (1993), 222-240; J. H. Stock and M. Yogo, in
@@ -98,10 +119,10 @@ def _weak(G: Array, second: Second, names: tuple[str, ...], samples: int) -> lis
     left = regressors - explained
     left = left + max(1e-9, -2.0 * float(np.linalg.eigvalsh(left)[0])) * np.eye(len(left))  # rounding
     ratios, vectors = scipy.linalg.eigh((explained + explained.T) / 2, (left + left.T) / 2)
-    statistics = ratios * samples / len(names)
+    statistics = ratios * samples / len(axes.names)
     weak = statistics < WEAK_STATISTIC
     unit = vectors / np.linalg.norm(vectors, axis=0)
-    return [_direction(names, unit[:, i], float(np.clip(ratios[i], 0.0, 1.0))) for i in np.flatnonzero(weak)]
+    return [axes.direction(unit[:, i], float(np.clip(ratios[i], 0.0, 1.0))) for i in np.flatnonzero(weak)]
 
 
 def require_informative(found: NullSpace) -> None:
@@ -121,6 +142,7 @@ def require_informative(found: NullSpace) -> None:
         f"the data contain no information about these parameters or combinations: {listed}; excite them, or fix "
         f"{' '.join(sorted(kept))}",
         parameters=names,
+        unseen=tuple(direction.change for direction in found.unseen),
     )
 
 
@@ -139,9 +161,3 @@ def _sparse(basis: Array) -> Array:
     _, _, pivots = scipy.linalg.qr(basis, pivoting=True)
     reduced = np.linalg.solve(basis[:, pivots[: len(basis)]], basis)
     return np.asarray(reduced / np.linalg.norm(reduced, axis=1, keepdims=True))
-
-
-def _direction(names: tuple[str, ...], vector: Array, strength: float) -> Direction:
-    order = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SMALL_WEIGHT]
-    signed = vector * np.sign(vector[order[0]])
-    return Direction(parameters=tuple(names[i] for i in order), weights=signed[order], strength=strength)

@@ -94,7 +94,11 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
         if len(outputs) and not len(rows):
             names = tuple(regression.parameters[index] for index in columns)
             equations = ", ".join(regression.outputs[index] for index in outputs)
-            raise NotInformative(f"no sample is left for {equations}, which {', '.join(names)} need", parameters=names)
+            raise NotInformative(
+                f"no sample is left for {equations}, which {', '.join(names)} need",
+                parameters=names,
+                unseen=tuple({name: 1.0} for name in names),
+            )
     Phi = _cut(regression.Phi[rows], outputs, columns)
     group = _groups(regression, rows, outputs, mean)
     varying = _without_mean(Phi, group, mean)
@@ -192,7 +196,7 @@ def solvers(system: System, Z: Array, weighting: Weighting, *, exogenous: bool) 
         for w, rows in zip(weights, system.parts, strict=True)
     ]
     stacked = np.concatenate([half @ H for half, H in zip(halves, moments, strict=True)])
-    found = null_space(stacked, system.names, samples=len(Z), exogenous=exogenous)
+    found = null_space(stacked, system.names, system.size, samples=len(Z), exogenous=exogenous)
     if found.unseen:
         return [], found
     pieces = np.split(np.linalg.pinv(stacked), np.cumsum([len(half) for half in halves])[:-1], axis=1)
@@ -207,7 +211,7 @@ def _one_block(
     if not exogenous:
         size = system.size
         second = (_moment(Z, Z) / np.outer(row, row), _moment(system.varying, system.varying) / np.outer(size, size))
-    found = null_space(total, system.names, samples=len(Z), exogenous=exogenous, second=second)
+    found = null_space(total, system.names, system.size, samples=len(Z), exogenous=exogenous, second=second)
     if found.unseen:
         return [], found
     A = np.linalg.inv(total) / system.size[:, None] / row
