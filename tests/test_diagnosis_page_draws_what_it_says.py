@@ -201,7 +201,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
     assert page.index("Missing acceleration") < page.index("<h2>1. ")
 
 
-@pytest.mark.parametrize(("p_value", "said"), [(0.024, False), (0.25, True)])
+@pytest.mark.parametrize(("p_value", "said"), [(0.024, False), (0.049, False), (0.25, True)])
 def test_a_cause_with_a_large_p_value_is_said_to_stay_for_another_reason(clean, p_value: float, said: bool):
     item = finding(("theta:X_u",), estimates=(Estimate(name="X_u", value=0.1, std=0.01, unit=""),))
     found = replace(

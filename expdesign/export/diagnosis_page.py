@@ -380,7 +380,7 @@ def _fit(value: float) -> str:
 
 def _p_value(p_value: float) -> str:
     """Two digits, and why a large one counts; very small ones depend on the noise, so only a bound is given."""
-    if p_value > SELECTION_TUNING.accepted_p_value:  # see `diagnosis.select.backward_elimination`
+    if p_value > SELECTION_TUNING.level:  # see `diagnosis.select.backward_elimination`
         return f"{p_value:.2g}; it stays because simulations of held-out data are worse without it"
     return f"< {SMALLEST_P_VALUE:g}" if p_value < SMALLEST_P_VALUE else f"{p_value:.2g}"
 
