@@ -23,6 +23,7 @@ EXPRESSIONS = {
     "N_ud": "abs(u)*u*sin(rudder1)",
 }  # fmt: skip
 NAMES = ("time_s", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", "r_radps", "n1_rps", "rudder1_rad")
+VANE = ("wind_speed_mps", "wind_angle_rad")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +40,7 @@ class Ship:
 
 @dataclass(frozen=True, kw_only=True)
 class Wind:
-    """A wind that nobody measures, over a ship of 50 m: in a beam wind of 10 m/s she carries 5 degrees of rudder."""
+    """A wind over a ship of 50 m, which few measure: in a beam wind of 10 m/s she carries 5 degrees of rudder."""
 
     mean_mps: float = 0.0
     gust_mps: float = 0.0  # standard deviation of gusts, which last `gust_s`
@@ -48,6 +49,7 @@ class Wind:
     turn_rad: float = 0.0  # by which it turns meanwhile
     over_s: float = HOUR
     squall_mps: float = 0.0  # by which it rises at once then, for ten minutes
+    measured: bool = False  # on board, by a vane that stands askew in air that the ship makes faster
 
     def drawn(self, seconds: int, rng: np.random.Generator, hz: int, since_s: int) -> np.ndarray:
         """(s, 2) towards north and east [m/s], from a direction of chance."""
@@ -61,6 +63,8 @@ class Wind:
 
 WIND_FORCES = np.array([1e-4, 4.5e-4, 7e-6])
 """Accelerations of surge, sway and yaw by the square of a wind on the bow, and from abeam [1/m, 1/m, rad/m2]."""
+VANE_GAIN, VANE_RAD, VANE_STD = 1.05, np.deg2rad(3.0), (0.5, np.deg2rad(3.0))
+"""Of the vane: what it tells of the wind's speed, by how much it is askew, and its noise [m/s, rad]."""
 FRESH = Wind(mean_mps=4.0, gust_mps=0.7)
 WINDS = {
     "as in the reference": FRESH,
@@ -113,7 +117,7 @@ CASES = {
 def sailed(
     ships: Sequence[Ship], seconds: int, *, seeds: Sequence[int], sea: Sea = Sea(), since_s: int = 0
 ) -> np.ndarray:
-    """(voyages, samples, 9) measured columns `NAMES` of voyages.
+    """(voyages, samples, 9) measured columns `NAMES` of voyages, and two of `VANE` where the wind is measured.
 
     Args:
         ships: of each voyage, as they are from `since_s` on.
@@ -132,7 +136,9 @@ def sailed(
     before = {name: np.full(len(ships), value) for name, value in vars(Ship()).items()}
     v, step_s, samples = len(ships), 1.0 / sea.hz, seconds * sea.hz
     slow[:, 2] += np.clip(np.arange(samples) * step_s - since_s, 0, HOUR)[:, None] / HOUR * later["push_radps2"]
-    table = np.empty((samples, len(NAMES), v))
+    columns = len(NAMES) + len(VANE) * sea.wind.measured
+    table = np.empty((samples, columns, v))
+    vane = np.stack([np.random.default_rng([seed, 2]).standard_normal((samples, 2)) for seed in seeds], axis=-1)
     state = np.zeros((6, v))  # u, v, r, north, east, heading
     state[0] = 4.0
     rudder, felt, n = np.zeros(v), np.zeros((2, v)), speed[0]
@@ -149,7 +155,8 @@ def sailed(
         begun = rudder
         rudder = rudder + np.clip(order - rudder, -0.05 * step_s, 0.05 * step_s)
         n = n + np.clip(speed[sample] - n, -0.05 * step_s, 0.05 * step_s)
-        table[sample] = np.stack([np.full(v, sample * step_s), *told, n, (begun + rudder) / 2])
+        felt_air = _vane(state, air[sample], vane[sample]) if sea.wind.measured else ()
+        table[sample] = np.stack([np.full(v, sample * step_s), *told, n, (begun + rudder) / 2, *felt_air])
         for part in range(INSIDE):
             angle = begun + (rudder - begun) * (part + 0.5) / INSIDE + ship["rudder_rad"]
             push = slow[sample] + _blown(state, air[sample])
@@ -214,10 +221,23 @@ def _blown(state: np.ndarray, air: np.ndarray) -> np.ndarray:
     """(3, v) accelerations by a wind (2, v)."""
     if not air.any():
         return np.zeros((3, state.shape[1]))
-    c, s = np.cos(state[5]), np.sin(state[5])
-    ahead, beside = c * air[0] + s * air[1] - state[0], -s * air[0] + c * air[1] - state[1]
+    ahead, beside = _past(state, air)
     size = np.hypot(ahead, beside)
     return WIND_FORCES[:, None] * np.stack([size * ahead, size * beside, size * beside])
+
+
+def _past(state: np.ndarray, air: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(v,) velocities of the air past the ship along her axes [m/s]."""
+    c, s = np.cos(state[5]), np.sin(state[5])
+    return c * air[0] + s * air[1] - state[0], -s * air[0] + c * air[1] - state[1]
+
+
+def _vane(state: np.ndarray, air: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(v,) `VANE` of a wind (2, v): its speed, and where it comes from, clockwise from the bow."""
+    ahead, beside = _past(state, air)
+    speed = np.abs(VANE_GAIN * np.hypot(ahead, beside) + VANE_STD[0] * noise[0])
+    angle = np.arctan2(-beside, -ahead) + VANE_RAD + VANE_STD[1] * noise[1]
+    return speed, np.mod(angle + np.pi, 2 * np.pi) - np.pi
 
 
 def _stepped(
@@ -247,12 +267,21 @@ def _rates(
 
 
 def written(path: Path, table: np.ndarray, *, begin_s: float = 0.0) -> Path:
-    """A voyage (s, 9) as a file."""
+    """A voyage of `sailed` as a file."""
     told = table.copy()
     told[:, 0] += begin_s
     told[:, 3] = np.mod(told[:, 3] + np.pi, 2 * np.pi) - np.pi
-    np.savetxt(path, told, delimiter=",", header=",".join(NAMES), comments="", fmt="%.6g")
+    names = ",".join((*NAMES, *VANE)[: told.shape[1]])
+    np.savetxt(path, told, delimiter=",", header=names, comments="", fmt="%.6g")
     return path
+
+
+def relative_wind(table: np.ndarray) -> np.ndarray | None:
+    """(s, 2) velocity of the ship through the air along her axes [m/s], as the vane of a voyage tells it."""
+    if table.shape[1] == len(NAMES):
+        return None
+    speed, angle = table[:, len(NAMES) :].T
+    return np.stack([speed * np.cos(angle), speed * np.sin(angle)], axis=-1)
 
 
 def vessel_file(path: Path) -> Path:

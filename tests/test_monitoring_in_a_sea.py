@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.diagnosis.data import has_wind
 from expdesign.diagnosis.motion import stable_windows
 from expdesign.diagnosis.select import Suspected, suspected_tests
 from expdesign.diagnosis.vessel_file import extended_model
@@ -33,6 +34,7 @@ from expdesign.monitoring import (
     threshold,
     watch,
     watched_changes,
+    watched_ship,
 )
 from expdesign.monitoring.evidence import STARTS
 from expdesign.monitoring.noise import whitened
@@ -40,7 +42,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from expdesign.workflows.commands.diagnose import with_alarms
-from sea_case import CALM, CASES, FRESH, HOUR, OTHER_SEAS, WINDS, Sea, Ship, sailed, vessel_file, written
+from sea_case import CALM, CASES, FRESH, HOUR, OTHER_SEAS, WINDS, Sea, Ship, relative_wind, sailed, vessel_file, written
 
 PUSHED = Sea(pushed_s=5.0)
 STEPS = 14
@@ -54,7 +56,7 @@ def vessel(tmp_path_factory: pytest.TempPathFactory) -> Vessel:
 def as_record(vessel: Vessel, table: np.ndarray) -> Record:
     batch = Batch(
         name="voyage", sample_time_s=table[1, 0] - table[0, 0], input_names=vessel.model.inputs, inputs=table[:, 7:9],
-        velocity=table[:, 4:7], pose=table[:, 1:4],
+        velocity=table[:, 4:7], pose=table[:, 1:4], wind=relative_wind(table),
     )  # fmt: skip
     return Record(batches=(batch,), notes=())
 
@@ -62,8 +64,11 @@ def as_record(vessel: Vessel, table: np.ndarray) -> Record:
 def stretches(vessel: Vessel, table: np.ndarray, *, known: Noise | None = None, noise: Noise | None = None):
     """Changes that are watched for, the noise and the inner products of a voyage."""
     record = as_record(vessel, table)
-    ship = extended_model(vessel, record)
-    changes, words = watched_changes(ship), {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)}
+    ship = watched_ship(vessel, record)
+    changes, words = (
+        watched_changes(ship, wind=has_wind(record)),
+        {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)},
+    )
     if noise is not None:
         return changes, noise, grams_of(ship, record, changes, noise=noise, **words)
     grams, noise = grams_and_noise(ship, record, changes, known=known, **words)
@@ -248,7 +253,7 @@ def false_in(vessel: Vessel, sea: Sea, seeds: Sequence[int], *, hours: int = 2, 
     false = list[str]()
     for seed, before, after in zip(seeds, *voyages, strict=True):
         changes, noise, grams = stretches(vessel, before)
-        known = noise, calibrate(grams, load=np.array([change.load for change in changes]))
+        known = noise, calibrate(grams, changes=changes)
         false += [f"{seed}: {changes[k].effect} of the reference" for k in np.flatnonzero(said_of_reference(known[1]))]
         false += [f"{seed}: {name}" for name in alarms_of(vessel, known, after)[1]]
     return false

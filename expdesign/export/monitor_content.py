@@ -84,6 +84,11 @@ class MonitorContent:
         return tuple((raised[alarm.time_s], alarm) for alarm in self.alarms if alarm.withdrawn)
 
     @property
+    def wind(self) -> bool:
+        """Whether it is measured, so that what it does is no change of the ship."""
+        return any(change.air for change in self.changes)
+
+    @property
     def calls(self) -> tuple[Call, ...]:
         """Port calls, with what they changed."""
         return calls_of(self.state, self.calibration)
@@ -118,6 +123,12 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
         yield _withdrawn(content, raised, last)
     if found:
         yield f"Alarms are raised {rate}. For the cause, give the rows since then to expdesign diagnose."
+    if any(_may_be_wind(content, alarm) for alarm in found):
+        yield (
+            "That rate is for weather as in the reference: a wind that rises far beyond it may look the same, as the "
+            "rudder answers its push. Compare with the log, or record wind_speed_mps and wind_angle_rad in reference "
+            "and data."
+        )
     yield from _passed(content)
     yield from _beyond(content)
     if state.shoal_s and not (left_out > HALF and state.shoal_s > HALF * state.left_out_s):
@@ -237,6 +248,8 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     statistic, limit = told_apart(alarm.statistic, content.limit)
     whose = "a sensor" if change.effect == GYRO else "the ship"
     own, who = f"{change.words} by {size_in_words(content, alarm)}", f"{whose} has changed"
+    if _may_be_wind(content, alarm):
+        who += ", or the wind, which is not measured"
     if alarm.pushes:
         push = f"a steady push in {' or '.join(pushed(content, alarm))} by wind or current"
         if pushed(content, alarm, beyond=AS_LIKELY):
@@ -260,6 +273,11 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     return text
 
 
+def _may_be_wind(content: MonitorContent, alarm: Alarm) -> bool:
+    """Whether a wind that nobody measures could do what the change of the ship does; a gyro's errors it cannot do."""
+    return not content.wind and content.changes[alarm.change].effect != GYRO
+
+
 def pushed(content: MonitorContent, alarm: Alarm, *, beyond: float = -np.inf) -> list[str]:
     """Equations in which a steady push would do what the change does, the likeliest first; by more than `beyond`."""
     named = {change.effect: change for change in content.changes}
@@ -270,7 +288,7 @@ def pushed(content: MonitorContent, alarm: Alarm, *, beyond: float = -np.inf) ->
 def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
     """(m,) differences of the ship from its file in the reference that are clear enough to be said."""
     size = np.abs(calibration.baseline)
-    return np.asarray((size > CLEAR * calibration.baseline_std) & (size > LARGE))
+    return np.asarray((size > CLEAR * calibration.baseline_std) & (size > LARGE) & (calibration.wanted > 0))
 
 
 def _baseline(content: MonitorContent) -> Iterator[str]:
@@ -326,6 +344,8 @@ def monitor_rows(content: MonitorContent) -> list[tuple[str, ...]]:
     last = content.moments[-1] if content.moments else None
     rows: list[tuple[str, ...]] = []
     for number, change in enumerate(content.changes):
+        if not change.watched:
+            continue
         watched = bool(content.calibration.watched[number])
         since = "\N{EN DASH}"
         if last is not None and np.isfinite(last.std[number]) and last.std[number] < 1e3:

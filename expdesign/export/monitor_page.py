@@ -192,6 +192,9 @@ def _shown(content: MonitorContent) -> Sequence[int]:
     return list(dict.fromkeys([*(alarm.change for alarm in content.found), *best]))[:SHOWN]
 
 
+WINDY = "The wind is measured. What it does was learnt from the reference, so that it is no change of the ship."
+
+
 def monitor_document(content: MonitorContent) -> Document:
     """The watch for people."""
     state, kinds = content.state, (kind.capitalize() for kind in KINDS)
@@ -225,6 +228,7 @@ def monitor_document(content: MonitorContent) -> Document:
                 "\u201cAlarm after\u201d is the expected time from a change of this size to its alarm, in operation "
                 "like that of the reference. Changes that are not distinguishable raise the same alarm; a manoeuvre of "
                 "another kind would distinguish them.",
+                *(WINDY,) * content.wind,
             ),
             section(
                 "Which manoeuvres reveal which change",

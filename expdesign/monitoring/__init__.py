@@ -15,7 +15,7 @@ M. Basseville and I. V. Nikiforov, Detection of Abrupt Changes (1993), chapters 
 
 from expdesign.monitoring.alarms import AS_LIKELY, Again
 from expdesign.monitoring.calibration import Calibration, calibrate
-from expdesign.monitoring.changes import EQUATIONS, Change, watched_changes
+from expdesign.monitoring.changes import EQUATIONS, Change, watched_changes, watched_ship
 from expdesign.monitoring.cusum import calls_of, estimates, soonest, threshold, watch
 from expdesign.monitoring.evidence import KINDS, Grams, grams_and_noise, grams_of, joined, later_part, stretch_length
 from expdesign.monitoring.noise import WHITE, Noise

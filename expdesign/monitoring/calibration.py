@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from expdesign.errors import NotInformative
+from expdesign.monitoring.changes import Change
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
 from expdesign.values import Array, sealed
@@ -59,6 +61,7 @@ LEAST_SURPRISE = 0.1
     rate="m",
     alike="m m",
     load="m",
+    wanted="m",
     weights="m q",
     surprise="m",
 )
@@ -81,6 +84,7 @@ class Calibration:
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
+    wanted: Array  # (m,) one for changes that are watched for where they can be, zero for those that are learnt only
     shoal_limit: float  # draught over depth beyond which the water is shallower than the reference's
 
     @property
@@ -111,7 +115,7 @@ class Calibration:
     @property
     def watched(self) -> NDArray[np.bool_]:
         """(m,) changes that can be told from the uncertainty of the reference itself."""
-        return np.asarray(self.rate * self.stretches >= KNOWN_WITHIN**2)
+        return np.asarray((self.rate * self.stretches >= KNOWN_WITHIN**2) & (self.wanted > 0))
 
     @property
     def common(self) -> float:
@@ -119,7 +123,7 @@ class Calibration:
         return float(self.inflation[self.watched].max())
 
 
-def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
+def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
     """Noise, force and baseline of a reference.
 
     Noise and the variances of a force that is independent from stretch to stretch have the largest likelihood, by
@@ -128,7 +132,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
 
     Args:
         grams: of the reference, in which the ship carries one load.
-        load: (m,) standard deviation of what a port call may change, in sizes; None for nothing.
+        changes: those of the inner products; without them all are watched for, and no port call changes the load.
 
     Raises:
         NotInformative: too few stretches.
@@ -169,7 +173,8 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         seas=_seas(force, stretches),
         weights=weights,
         surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
-        load=np.zeros(m) if load is None else load,
+        load=np.array([change.load for change in changes]) if changes else np.zeros(m),
+        wanted=np.array([float(change.watched) for change in changes]) if changes else np.ones(m),
         shoal_limit=float(grams.shoal.max()) + SHOALER,
     )
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from expdesign.diagnosis.model import ExtendedModel
-from expdesign.vessel import stem
+from expdesign.diagnosis.model import ExtendedModel, own_air_terms
+from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.signals import Record
+from expdesign.vessel import Term, Vessel, stem
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS, GYRO
 
 RELATIVE_SIZE = 0.1  # change of a parameter, a gain or an inertia that matters, as a share
@@ -20,6 +22,26 @@ LOADS = (("inertia", 2.0), ("hull", 1.0))
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
 
+AIR_TERMS = (
+    Term("u", "W_abs_u_u", "abs(u_q)*u_q"),
+    Term("u", "W_abs_v_u", "abs(v_q)*u_q"),
+    Term("v", "W_abs_v_v", "abs(v_q)*v_q"),
+    Term("v", "W_abs_u_v", "abs(u_q)*v_q"),
+    Term("r", "W_uv", "u_q*v_q"),
+    Term("r", "W_N_abs_v_v", "abs(v_q)*v_q"),
+    Term("r", "W_N_abs_u_v", "abs(u_q)*v_q"),
+)
+"""Air drag: forces that grow with the square of the wind, of a hull that is alike to both sides.
+
+They span what is usual: a force by the cosine and the sine of the wind's angle, and a moment by the side force, which
+acts before or abaft midships and moves with the angle. Source: W. Blendermann, Journal of Wind Engineering and
+Industrial Aerodynamics 51 (1994), 339-351.
+"""
+BOX = 1e-3
+"""Half the density of air over that of water, over a block coefficient of 0.6: air drag per mass of a box on the hull,
+as high as the beam and with a drag coefficient of one, times the draught."""
+TOLD_MPS = 10.0  # wind for which air drag is told [m/s]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
@@ -31,6 +53,12 @@ class Change:
     words: str  # e.g. "parameter N_r".
     whole: float = 0.0  # value of the effect that is the whole term: of a parameter itself; zero where there is no term
     load: float = 0.0  # standard deviation of what another load changes, in sizes; zero where it changes nothing
+    air: bool = False  # it acts by the wind that is measured
+
+    @property
+    def watched(self) -> bool:
+        """Whether it is watched for; air drag that the model lacks is learnt only."""
+        return not (self.air and self.effect.startswith("term:"))
 
     def in_words(self, value: float, std: float | None = None) -> str:
         """A value in words, e.g. "+12.1 ± 3.2 %", with no digits beyond those of its error."""
@@ -42,23 +70,35 @@ class Change:
         return f"{round(size, decimals) + 0.0:+.{decimals}f} ± {spread:.{decimals}f} {name}"
 
 
-def watched_changes(ship: ExtendedModel, *, size: float = RELATIVE_SIZE) -> tuple[Change, ...]:
+def watched_ship(vessel: Vessel, record: Record) -> ExtendedModel:
+    """The model of a vessel file for a record, to which the watch may add air drag."""
+    ship = extended_model(vessel, record)
+    air = {term.name: term for term in AIR_TERMS if term.equation in ship.model.outputs}
+    return replace(ship, library={**ship.library, **air})
+
+
+def watched_changes(ship: ExtendedModel, *, size: float = RELATIVE_SIZE, wind: bool = False) -> tuple[Change, ...]:
     """Parameters of the model, inertia by equation, thrust, angles of rudders and azimuths, and the yaw-rate sensor.
 
+    Where the wind is measured and the model knows no air drag, that is learnt from the reference, too, so that a wind
+    that rises is no change of the ship.
+
     Args:
-        ship: the model with what its file states.
+        ship: the model with what its file states; of `watched_ship` where the wind is measured.
         size: relative change of parameters, thrust and inertia that matters; of angles and the yaw-rate sensor in
             proportion.
+        wind: whether it is measured.
     """
     share = size / RELATIVE_SIZE
     model = ship.model
+    own = own_air_terms(model) if wind else []
     loads = {kind: std / share for kind, std in LOADS}
     hull = {name for name, part in zip(model.names, ship.scaled_terms, strict=False) if part.damping}
     values = dict(zip(model.names, model.parameters.tolist(), strict=True))
     changes = [
         Change(
             effect=f"theta:{name}", size=size * abs(value), unit=(0.01 * value, "%"), words=f"parameter {name}",
-            whole=value, load=loads["hull"] if name in hull else 0.0,
+            whole=value, load=loads["hull"] if name in hull else 0.0, air=name in own,
         )
         for name, value in values.items()
         if value
@@ -88,4 +128,24 @@ def watched_changes(ship: ExtendedModel, *, size: float = RELATIVE_SIZE) -> tupl
         for row in GAINS_AND_OFFSETS
         if row.is_gain and row.shown_by == GYRO and row.is_shown(ship.derived) and "r" in model.outputs
     ]
-    return tuple(changes)
+    return (*changes, *(_air_drag(ship, share, loads["hull"]) if wind and not own else ()))
+
+
+def _air_drag(ship: ExtendedModel, share: float, load: float) -> tuple[Change, ...]:
+    """In sizes of a `BOX`, whose moments have an arm of a tenth of the length."""
+    aside = BOX / ship.draught_m
+    turning = aside * 1.6 / ship.length_m  # with a radius of gyration of a quarter of the length
+    sizes = {"u": aside * ship.beam_m / ship.length_m, "v": aside, "r": turning}
+    units = {"u": (1.0, "m/s2"), "v": (1.0, "m/s2"), "r": (math.radians(1.0), "degrees/s2")}
+    return tuple(
+        Change(
+            effect=f"term:{name}",
+            size=share * sizes[equation := ship.library[name].equation],
+            unit=(units[equation][0] / TOLD_MPS**2, f"{units[equation][1]} in {TOLD_MPS:g} m/s"),
+            words=f"air drag in {EQUATIONS[equation]}",
+            load=load,
+            air=True,
+        )
+        for name in (term.name for term in AIR_TERMS)
+        if name in ship.library
+    )

@@ -32,7 +32,8 @@ CLOCKED_ROWS = 50
 """From which the time between samples is learnt."""
 LINES = 4096
 """Looked at together."""
-OPTIONAL = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad", "depth_m", "steered", "batch", *AUXILIARY)
+WIND_COLUMNS = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad")
+OPTIONAL = (*WIND_COLUMNS, "depth_m", "steered", "batch", *AUXILIARY)
 
 
 CORRECTED_SHARE = 0.005
@@ -108,7 +109,7 @@ def pieces(
         inputs: signals of the vessel, e.g. ("n1", "a1").
         stretch_s: length of a stretch [s].
         most_rows: of a piece; one that is shorter than a stretch has the rows of one.
-        unread: columns that rows may lack.
+        unread: columns that rows may lack; so may those of a wind that none of the first rows has.
         before: header and `pending` lines of earlier data, which come first where the header is the same.
         more_follow: the source goes on later: rows at its end that do not fill a stretch are `pending`, and a last
             line that does not end is not read.
@@ -123,9 +124,9 @@ def pieces(
         if not header.strip():
             raise FileError(source, "", "is empty, expected a header row and one row per sample")
         chosen, _ = choose_columns(source, names, inputs=Inputs(tuple(map(column_name, inputs)), "the vessel"))
-        columns = _Columns(chosen, unread)
         lines = iter(file.readline, "")
         first = list(itertools.islice(lines, CLOCKED_ROWS))
+        columns = _Columns(chosen, unread, first)
         step_s = _step_of(source, columns, first) or stretch_s
         stretch = max(1, round(stretch_s / step_s))
         how = _Cut(
@@ -242,7 +243,11 @@ def _cut(source: Iterator[str], how: _Cut, rows: int, again: int) -> Iterator[Pi
 class _Columns:
     """Places of the columns that are needed, and of those that may be missing."""
 
-    def __init__(self, chosen: Sources, unread: Sequence[str]) -> None:
+    def __init__(self, chosen: Sources, unread: Sequence[str], first: Sequence[str]) -> None:
+        unread = (
+            *unread,
+            *(name for name in WIND_COLUMNS if name in chosen and not _filled(first, chosen[name].column)),
+        )
         self.needed = [source.column for name, source in chosen.items() if name not in unread]
         self.optional = {source.column for name, source in chosen.items() if name in unread}
         self.clock = chosen["time_s"]
@@ -280,6 +285,12 @@ class _Columns:
     def times(self, lines: Sequence[str]) -> Array:
         """(k,) [s]; nan where a cell is no number, of which the reader complains."""
         return self.clock.factor * np.array([_number(line, self.clock.column) for line in lines])
+
+
+def _filled(lines: Sequence[str], column: int) -> bool:
+    """Whether any of these lines has something in a column."""
+    cells = [line.rstrip("\r\n").split(",")[column : column + 1] for line in lines]
+    return any(cell[0].strip().lower() not in MISSING for cell in cells if cell)
 
 
 def _full(text: str) -> bool:

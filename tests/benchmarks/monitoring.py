@@ -28,7 +28,6 @@ import numpy as np
 from expdesign.monitoring.evidence import STRETCH_S
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.monitoring import (
     WHITE,
     Alarm,
@@ -45,6 +44,7 @@ from expdesign.monitoring import (
     threshold,
     watch,
     watched_changes,
+    watched_ship,
 )
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
@@ -113,7 +113,7 @@ def gone_on(
     noise: Noise = WHITE,
 ) -> tuple[State, list[Alarm]]:
     """A record watched from a state on, linearised anew after each change, and the alarms in it."""
-    ship, alarms, first = extended_model(vessel, record), list[Alarm](), 0
+    ship, alarms, first = watched_ship(vessel, record), list[Alarm](), 0
 
     def linearised(shift: np.ndarray, since_s: float = begin_s) -> Grams:
         effects = {c.effect: c.size * x for c, x in zip(changes, shift.tolist(), strict=True) if x}
@@ -214,13 +214,13 @@ def weathers(trials: int) -> None:
 def calibrated(vessel: Vessel) -> tuple[tuple[Change, ...], Calibration]:
     """Changes that are watched for, and a calibration on voyages of two hours."""
     references = [voyage_record(vessel, 2 * HOUR, seed=500 + number) for number in range(8)]
-    ship = extended_model(vessel, references[0])
+    ship = watched_ship(vessel, references[0])
     changes = watched_changes(ship)
     parts = [
         grams_of(ship, reference, changes, begins_s=[3.0 * HOUR * number], stretch_s=STRETCH_S)
         for number, reference in enumerate(references)
     ]
-    return changes, calibrate(joined(parts), load=np.array([change.load for change in changes]))
+    return changes, calibrate(joined(parts), changes=changes)
 
 
 def study(trials: int, days: float) -> None:

@@ -4,7 +4,7 @@
 autopilot in a slight sea, beside a plain average of her steady speeds. ``--calm`` the same without waves; ``--seas``
 and ``--cases`` those alone, of more seas than these; ``--white`` with no model of the noise within stretches;
 ``--seed`` with other numbers than those that constants were chosen on; ``--winds`` an unchanged ship in winds that
-nobody measures, after a reference in a fresh one.
+nobody measures, after a reference in a fresh one; with ``--measured`` a vane on board measures them.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.diagnosis.data import has_wind
 from expdesign.export.monitor_content import said_of_reference
 from expdesign.monitoring import (
     AS_LIKELY,
@@ -34,12 +35,13 @@ from expdesign.monitoring import (
     stretch_length,
     threshold,
     watched_changes,
+    watched_ship,
 )
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from monitoring import DAY, HOUR, gone_on
-from sea_case import CALM, CASES, FRESH, NAMES, OTHER_SEAS, WINDS, Sea, Ship, sailed, vessel_file
+from sea_case import CALM, CASES, FRESH, NAMES, OTHER_SEAS, WINDS, Sea, Ship, relative_wind, sailed, vessel_file
 
 SEAS: tuple[tuple[str, Sea], ...] = (
     ("waves that sensors feel", Sea()),
@@ -64,7 +66,7 @@ STEADY_S = 120
 
 def as_record(vessel: Vessel, table: np.ndarray) -> Record:
     """A voyage of `sailed` as a record."""
-    column = dict(zip(NAMES, table.T, strict=True))
+    column = dict(zip(NAMES, table.T[: len(NAMES)], strict=True))
     batch = Batch(
         name="voyage",
         sample_time_s=1.0,
@@ -72,6 +74,7 @@ def as_record(vessel: Vessel, table: np.ndarray) -> Record:
         inputs=np.column_stack([column["n1_rps"], column["rudder1_rad"]]),
         velocity=np.column_stack([column["u_mps"], column["v_mps"], column["r_radps"]]),
         pose=np.column_stack([column["north_m"], column["east_m"], column["heading_rad"]]),
+        wind=relative_wind(table),
     )
     return Record(batches=(batch,), notes=())
 
@@ -124,28 +127,32 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
 def learnt(vessel: Vessel, table: np.ndarray, *, white: bool = False) -> tuple[Any, ...]:
     """Changes that are watched for, the noise and the calibration of a reference."""
     record = as_record(vessel, table)
-    ship = extended_model(vessel, record)
-    changes, words = watched_changes(ship), {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)}
+    ship = watched_ship(vessel, record)
+    changes, words = (
+        watched_changes(ship, wind=has_wind(record)),
+        {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)},
+    )
     if white:
         grams, noise = grams_of(ship, record, changes, **words), WHITE
     else:
         grams, noise = grams_and_noise(ship, record, changes, **words)
-    return changes, noise, calibrate(grams, load=np.array([change.load for change in changes]))
+    return changes, noise, calibrate(grams, changes=changes)
 
 
-def wind_study(trials: int, *, first: int) -> None:
+def wind_study(trials: int, *, first: int, measured: bool) -> None:
     """Alarms in 3 hours of an unchanged ship, after 4 hours of reference in a fresh wind."""
     with tempfile.TemporaryDirectory() as folder:
         vessel = load_vessel(vessel_file(Path(folder) / "vessel.toml"))
     seeds, ships = [10 * k + first for k in range(trials)], [Ship()] * trials
-    known = [learnt(vessel, table) for table in sailed(ships, 4 * HOUR, seeds=seeds, sea=Sea(wind=FRESH))]
+    fresh = Sea(wind=replace(FRESH, measured=measured))
+    known = [learnt(vessel, table) for table in sailed(ships, 4 * HOUR, seeds=seeds, sea=fresh)]
     print(
         "| wind | voyages | with an alarm | that stands | of which a push is named, too | left out |\n"
         "|---|---|---|---|---|---|"
     )
     for number, (name, wind) in enumerate(WINDS.items()):
         own = [seed + 1 + number for seed in seeds]
-        tables = sailed(ships, 3 * HOUR, seeds=own, sea=Sea(wind=wind), since_s=HOUR)
+        tables = sailed(ships, 3 * HOUR, seeds=own, sea=Sea(wind=replace(wind, measured=measured)), since_s=HOUR)
         rows = [sea_trial(vessel, table, table, one, "unchanged") for table, one in zip(tables, known, strict=True)]
         raised, alarms, pushes = (sum(row[key] for row in rows) for key in ("raised", "any", "push"))
         left = 100 * np.mean([row["left"] for row in rows])
@@ -161,7 +168,7 @@ def sea_trial(
     record = as_record(vessel, table)
     if not noise.white:
         words = {"begins_s": [0.0], "stretch_s": calibration.stretch_s, "known": noise}
-        _, noise = grams_and_noise(extended_model(vessel, record), record, changes, **words)
+        _, noise = grams_and_noise(watched_ship(vessel, record), record, changes, **words)
     state, alarms = gone_on(
         State.begun(calibration, time_s=0.0), vessel, record, changes, calibration, rules, begin_s=0.0, noise=noise
     )
@@ -225,9 +232,10 @@ if __name__ == "__main__":
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--seed", type=int, default=5000, help="the first")
     parser.add_argument("--winds", action="store_true", help="an unchanged ship in winds")
+    parser.add_argument("--measured", action="store_true", help="which a vane on board measures")
     asked = parser.parse_args()
     if asked.winds:
-        wind_study(asked.trials, first=asked.seed)
+        wind_study(asked.trials, first=asked.seed, measured=asked.measured)
         sys.exit()
     names = asked.seas or (["calm"] if asked.calm else [name for name, _ in SEAS])
     sea_study(asked.trials, [(name, every[name]) for name in names], asked.cases, first=asked.seed, white=asked.white)

@@ -14,6 +14,7 @@ from expdesign.diagnosis.data.sampled_batch import (
     averaging_half_width,
     derived_outputs,
     has_heading,
+    has_wind,
     missing_wind_share,
 )
 from expdesign.diagnosis.data.windows import Windows, cut_windows

@@ -28,6 +28,11 @@ def has_depth(batch: Batch) -> bool:
     return batch.depth_m is not None and bool(np.isfinite(batch.depth_m).any())
 
 
+def has_wind(record: Record) -> bool:
+    """Whether every batch has measured wind."""
+    return all(air_velocity(batch) is not None for batch in record.batches)
+
+
 def air_velocity(batch: Batch) -> Array | None:
     """(k, 2) velocity of the air over ground in the b-frame, nan where it or the ship's is not measured; or None."""
     if batch.wind is None:

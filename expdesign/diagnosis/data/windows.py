@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.data.sampled_batch import (
     SampledBatch,
-    air_velocity,
     derived_outputs,
     has_depth,
     has_heading,
     has_position,
+    has_wind,
 )
 from expdesign.errors import InputError
 from expdesign.estimation.regression import inputs_of
@@ -239,7 +239,7 @@ def cut_windows(
         batch_inputs=tuple(part.inputs for part in parts),
         has_heading=has_heading(record),
         has_position=has_position(record),
-        has_wind=all(air_velocity(batch) is not None for batch in record.batches),
+        has_wind=has_wind(record),
         has_depth=all(has_depth(batch) for batch in record.batches),
         derived=derived,
         names=tuple(batch.name for batch in record.batches),

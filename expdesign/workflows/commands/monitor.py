@@ -35,7 +35,7 @@ from expdesign.records import STREAM, Taken, pieces
 from expdesign.requests import repeating
 from expdesign.workflows.outcome import Outcome, finished, left_state, shared, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
-from expdesign.workflows.steps.watched_ship import Asked, Late, Read, prepared
+from expdesign.workflows.steps.watched_ship import Asked, Late, Read, prepared, unread
 from expdesign.workflows.steps.watching import (
     HOUR,
     Learning,
@@ -158,7 +158,8 @@ def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: b
     asked, due, done = work.asked, (0, time.monotonic() + WRITTEN_EVERY_S * (source != STREAM)), 0
     size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
     cut = pieces(
-        source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows, unread=asked.unread,
+        source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows,
+        unread=unread(asked.model, now.changes),
         before=now.reading.pending, more_follow=more_follow, taken=now.reading.taken,
     )  # fmt: skip
     tasks = ((piece, (piece.text, piece.time_s, known_of(now))) for piece in cut)
@@ -206,7 +207,7 @@ def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progres
             inputs=asked.vessel.model.inputs,
             stretch_s=asked.stretch_s,
             most_rows=MOST_ROWS,
-            unread=asked.unread,
+            unread=unread(asked.model, now.changes),
         ):
             progress(f"reading the reference, {source.name}", 0.0)
             read = prepared(asked, piece.text, piece.time_s, known_of(now))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from expdesign.diagnosis.data import has_wind
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import FileError, InputError
 from expdesign.kinematics import in_stated_time
 from expdesign.monitoring import (
@@ -21,6 +21,7 @@ from expdesign.monitoring import (
     later_part,
     stretch_length,
     watched_changes,
+    watched_ship,
 )
 from expdesign.monitoring.yaw import (
     KEY,
@@ -34,7 +35,7 @@ from expdesign.monitoring.yaw import (
 )
 from expdesign.records import as_file
 from expdesign.records.file import FIRST_ROW
-from expdesign.records.pieces import OPTIONAL
+from expdesign.records.pieces import OPTIONAL, WIND_COLUMNS
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
@@ -46,9 +47,13 @@ YAW = {f"yaw-{name}": YAW_MODELS[name] for name in ("full", "simplified")}
 Ship = ExtendedModel | YawShip
 
 
-def unread(name: str) -> tuple[str, ...]:
-    """Columns that rows may lack."""
-    return tuple(column for column in OPTIONAL if name == VESSEL or column not in needed_columns(YAW[name]))
+def unread(name: str, changes: Sequence[Change] = ()) -> tuple[str, ...]:
+    """Columns that rows may lack; not the wind, if any is measured, where changes that are watched for act by it."""
+    if name != VESSEL:
+        needed = needed_columns(YAW[name])
+    else:
+        needed = WIND_COLUMNS if not changes or any(change.air for change in changes) else ()
+    return tuple(column for column in OPTIONAL if column not in needed)
 
 
 def ship_and_changes(
@@ -70,8 +75,8 @@ def ship_and_changes(
     if known and any(change.effect.startswith(KEY) for change in known) != (name != VESSEL):
         raise InputError(f"--model is {name}, but the state to go on from is of another model; expected the same one")
     if name == VESSEL:
-        ship = extended_model(vessel, record)
-        return ship, tuple(known) or watched_changes(ship, size=size), ()
+        ship = watched_ship(vessel, record)
+        return ship, tuple(known) or watched_changes(ship, size=size, wind=has_wind(record)), ()
     model = YAW[name]
     if not known:
         learnt, notes = learnt_ship(model, vessel.model, record, stretch_s=stretch_s)
@@ -115,11 +120,6 @@ class Asked:
     velocity: str  # where velocities come from, as in `estimate`
     model: str = VESSEL  # "vessel" or one of `YAW`
     told: tuple[str, ...] = ()  # notes on the vessel, as of `equipped`
-
-    @property
-    def unread(self) -> tuple[str, ...]:
-        """Columns that rows may lack."""
-        return unread(self.model)
 
     @property
     def stretch_s(self) -> float:
@@ -205,6 +205,8 @@ def prepared(asked: Asked, text: str, time_s: Array, known: Known) -> Read | Unr
         record, begins = _record_of(asked, text, time_s)
     except FileError as error:
         return Unread(error.key, error.problem)
+    if any(change.air for change in known.changes) and not has_wind(record):
+        return Unread("wind", "is not measured, as it is in the reference; expected it in both, or in none of them")
     grams, known, noise, notes = _linearised(record, begins, known, asked)
     return Read(record=record, begins_s=begins, grams=grams, known=known, noise=noise, notes=notes)
 

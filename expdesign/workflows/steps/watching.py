@@ -233,7 +233,7 @@ def calibrated(now: Watch) -> Watch:
     learnt = now.phase.learnt
     if not learnt:
         raise NotInformative("the reference has no rows")
-    calibration = calibrate(joined(learnt), load=np.array([change.load for change in now.changes]))
+    calibration = calibrate(joined(learnt), changes=now.changes)
     if not calibration.watched.any():
         best = int(np.argmax(calibration.rate))
         larger = KNOWN_WITHIN / np.sqrt(max(float(calibration.rate[best]) * calibration.stretches, 1e-12))
