@@ -31,17 +31,13 @@ from expdesign import processes
 
 Result = TypeVar("Result")
 
-VARIABLE = "EXPDESIGN_CACHE"
-"""Environment variable: the folder of remembered results, or `off`."""
-MOST_BYTES = 256 * 2**20
-"""Size of the folder; the results not used for longest are dropped."""
+VARIABLE = "EXPDESIGN_CACHE"  # environment variable: the folder of remembered results, or `off`
+MOST_BYTES = 256 * 2**20  # size of the folder; the results not used for longest are dropped
 MARK = b"expdesign result 1\n"
 COMPUTING = ("casadi", "clarabel", "cvxpy", "matplotlib", "numpy", "ompl", "scipy", "shapely")
 """Packages whose version a result depends on."""
-OURS = re.compile(r"[0-9a-f]{40}|\.new-.*")
-"""Names of entries, and of those not yet in their place."""
-ABSENT = object()
-"""Stands for a result that is not remembered."""
+OURS = re.compile(r"[0-9a-f]{40}|\.new-.*")  # names of entries, and of those not yet in their place
+ABSENT = object()  # stands for a result that is not remembered
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,22 +19,16 @@ from expdesign.values import Array
 
 UNKNOWN_DEPTH = "No depths were checked: the chart names no depth areas. Check the whole track on the official chart."
 """Of an area without charted depths."""
-DENSE = 10.0
-"""Corners per clearance length of shore above which the clearance is eroded in steps."""
-ARC_SEGMENTS = 16
-"""Chords of a quarter circle at rounded corners."""
-STEPS = (1 / 16, 3 / 16, 3 / 4)
-"""Shares of the clearance eroded in each step."""
-TILE_CORNERS = 16_000
-"""Corners of a shore above which it is moved in tiles, and of one tile at most."""
+DENSE = 10.0  # corners per clearance length of shore above which the clearance is eroded in steps
+ARC_SEGMENTS = 16  # chords of a quarter circle at rounded corners
+STEPS = (1 / 16, 3 / 16, 3 / 4)  # shares of the clearance eroded in each step
+TILE_CORNERS = 16_000  # corners of a shore above which it is moved in tiles, and of one tile at most
 REACHES = {"round": 1.1, "mitre": 5.5}
 """Distances moved within which a shore matters: moved shores err by a hundredth, mitres are 5 long at most."""
 MOST_CORNERS, THINNED = 200_000, 0.005
 """Corners of a shore above which plans keep to a coarser one, and its tolerance as a share of the clearance."""
-KEPT = 16
-"""Eroded waters that a process keeps: those of a plan, and of a remedy or two."""
-NARROW = 4.0
-"""Reaches in a tile that is not halved again, however many corners it has."""
+KEPT = 16  # eroded waters that a process keeps: those of a plan, and of a remedy or two
+NARROW = 4.0  # reaches in a tile that is not halved again, however many corners it has
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from pathlib import Path
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment variables that libraries read once they are loaded; where they are set already, that holds."""
 SETTERS = tuple(f"{prefix}openblas_set_num_threads{suffix}" for prefix in ("scipy_", "") for suffix in ("64_", ""))
-MAPS = Path("/proc/self/maps")
-"""Lists the libraries that this process has loaded, on Linux."""
+MAPS = Path("/proc/self/maps")  # lists the libraries that this process has loaded, on Linux
 
 
 def use_one_thread() -> None:

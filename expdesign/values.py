@@ -17,8 +17,7 @@ from expdesign.errors import ShapeError
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")
-ASIDE = {"aside": True}
-"""Metadata of a field that says how a value came about, on which no result depends."""
+ASIDE = {"aside": True}  # metadata of a field that says how a value came about, on which no result depends
 
 
 def readonly(values: ArrayLike) -> Array:

@@ -14,8 +14,7 @@ import numpy as np
 from expdesign.errors import InputError
 from expdesign.values import Array
 
-G_MPS2 = 9.81
-"""Gravity, as everywhere in calculations of roll and waves [m/s2]."""
+G_MPS2 = 9.81  # gravity, as everywhere in calculations of roll and waves [m/s2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,8 +113,7 @@ class Waves:
         return 0.5 * 2.0 * np.pi / self.period_s, 3.0 * 2.0 * np.pi / self.period_s
 
 
-COMPONENTS, COURSES = 200, 36
-"""Number of drawn wave components, and of courses over which encounter is averaged."""
+COMPONENTS, COURSES = 200, 36  # number of drawn wave components, and of courses over which encounter is averaged
 
 
 POWERS = {

@@ -50,8 +50,7 @@ MOST_HELD = 5000  # samples of that
 RUNS_AWAY = 10.0  # times as fast as in the data that no hull gets
 
 
-UNBIASED = ("iv", "oe", "ls")
-"""Solvers, those first that noise biases least."""
+UNBIASED = ("iv", "oe", "ls")  # solvers, those first that noise biases least
 
 
 @sealed(shares="n")

@@ -18,16 +18,11 @@ from rich.progress import Progress as Bar
 from expdesign import __version__
 from expdesign.progress import Progress, silent
 
-BUG = 1
-"""Exit status of a defect of this program."""
-NO_ANSWER = 3
-"""Exit status where the input is fine but has no answer."""
-PLAIN_STEP = 0.1
-"""Least share of the work between two plain lines about the same activity."""
-LEAST_SHARE = 0.1
-"""Share of the work from which the time left is estimated."""
-STANDING_S = 10.0
-"""Least time in which the time left must have fallen."""
+BUG = 1  # exit status of a defect of this program
+NO_ANSWER = 3  # exit status where the input is fine but has no answer
+PLAIN_STEP = 0.1  # least share of the work between two plain lines about the same activity
+LEAST_SHARE = 0.1  # share of the work from which the time left is estimated
+STANDING_S = 10.0  # least time in which the time left must have fallen
 
 
 @contextmanager

@@ -118,8 +118,7 @@ def _by_folder(files: tuple[Path, ...]) -> dict[str, list[str]]:
     return folders
 
 
-NEEDED = ("nicegui", "tomlkit")
-"""Packages of the extra `web`."""
+NEEDED = ("nicegui", "tomlkit")  # packages of the extra `web`
 
 
 def web(

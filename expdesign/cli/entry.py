@@ -33,8 +33,7 @@ LISTS = {
     if one.flag and get_origin(one.kind) is tuple
 }
 """Options that take several values, and whether these are files."""
-LINE_END = re.compile(r"(?<!\n)\n(?!\n|Example:)")
-"""Within a paragraph."""
+LINE_END = re.compile(r"(?<!\n)\n(?!\n|Example:)")  # within a paragraph
 ESCAPED = escape("[a]").removesuffix("a]")
 Program = TypeVar("Program")
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130

@@ -36,8 +36,7 @@ CONSTANT_RANGE = 1e-9  # range of a constant input, as a share of its size
 LEAST_RESPONSE = 0.5
 
 
-PER_SECOND_DIFFERENCE = np.sqrt(6.0)
-"""Standard deviation of second differences of white noise of unit variance."""
+PER_SECOND_DIFFERENCE = np.sqrt(6.0)  # standard deviation of second differences of white noise of unit variance
 
 
 def check_excitation(ship: ExtendedModel, windows: Windows) -> None:
@@ -107,8 +106,7 @@ def white_noise_std(measured: Array) -> Array:
     return np.asarray(np.sqrt(mean.sum(axis=(0, 1)) / np.maximum(seen.sum(axis=(0, 1)), 1)) / PER_SECOND_DIFFERENCE)
 
 
-WHOLE_S = 1e9
-"""Length of windows that are whole runs [s]."""
+WHOLE_S = 1e9  # length of windows that are whole runs [s]
 
 
 def accuracy(ship: ExtendedModel, record: Record) -> Accuracy:

@@ -222,8 +222,7 @@ MOST_SAMPLES = 400_000
 FEW_SAMPLES = 10_000
 """Compared samples up to which other processes save no time, because they are started and fits are sent to them: of an
 hour at 1 Hz, a fifth of the work can be shared, and takes twice as long elsewhere."""
-SIMULATED = 18.0
-"""Work before the selection, in simulations of all data."""
+SIMULATED = 18.0  # work before the selection, in simulations of all data
 
 
 def diagnose(

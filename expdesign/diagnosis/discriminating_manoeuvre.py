@@ -15,10 +15,8 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, stem
 
 HEADINGS = (0.0, np.pi / 2, np.pi, 3 * np.pi / 2)
-ROUNDS = 2
-"""Simulations until the heading is accurate enough; it depends on current and wind, which depend on it."""
-PROPOSED = 240
-"""Samples of a standard proposal."""
+ROUNDS = 2  # simulations until the heading is accurate enough; it depends on current and wind, which depend on it
+PROPOSED = 240  # samples of a standard proposal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -42,8 +42,7 @@ from expdesign.progress import Progress, within
 from expdesign.signals import Record
 from expdesign.values import Array
 
-LITTLE_FIT = 50.0
-"""Fit of an output [%] below which a simulation explains little."""
+LITTLE_FIT = 50.0  # fit of an output [%] below which a simulation explains little
 
 
 def errors_as_judged(

@@ -50,10 +50,8 @@ from expdesign.processes import in_order
 from expdesign.progress import Progress
 from expdesign.values import Array
 
-RE_ESTIMATED = "parameters"
-"""No cause here: all models have their uncertain parameters fitted."""
-CURRENT = "current"
-"""Certain here only where it gains much: one that wanders gains as a steady one does."""
+RE_ESTIMATED = "parameters"  # no cause here: all models have their uncertain parameters fitted
+CURRENT = "current"  # certain here only where it gains much: one that wanders gains as a steady one does
 CLEAR, MUCH = 0.02, 0.1
 """Shares of what the model without it leaves unexplained: a gain worth a finding, and the least gain of a current that
 is steady for certain. Of one that wanders the least gain was above 0.06 in none of 57 simulated trials."""

@@ -10,8 +10,7 @@ from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-VISIBLE = 0.01
-"""Reduction of an error below which no number is given."""
+VISIBLE = 0.01  # reduction of an error below which no number is given
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

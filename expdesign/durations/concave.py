@@ -36,8 +36,7 @@ SMALL_WEIGHT = 0.05  # least weight in a null vector of a parameter that a messa
 
 
 IDLE = "(unused time)"
-T = "T"
-"""Name of the criterion that is about other parameters."""
+T = "T"  # name of the criterion that is about other parameters
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

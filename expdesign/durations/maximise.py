@@ -43,8 +43,7 @@ CONIC_INEQUALITIES = 5  # most models and floors of such a problem; each costs a
 
 
 CVXPY, WORKING_SET, NEWTON = "cvxpy with CLARABEL", "working-set method", "Newton's method"
-NO_CHOICE = "none: least times take all of the time"
-"""Names of the methods."""
+NO_CHOICE = "none: least times take all of the time"  # names of the methods
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -38,8 +38,7 @@ READINGS = (
 )
 """Damping, then the nuisance parameters that are it times the current to north and to east, with their signs."""
 FIRST, SECOND = (NORTH, EAST), (DIFFERENCE, PRODUCT)
-COMBINED = ("u", "v")
-"""Equations whose air and water terms of second degree are estimated as one."""
+COMBINED = ("u", "v")  # equations whose air and water terms of second degree are estimated as one
 
 
 @sealed(mean="2", second="2", central="2", covariance="6 6")

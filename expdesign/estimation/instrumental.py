@@ -32,8 +32,7 @@ EXACT_SHARE = 1e-12  # of the data's power, which residuals have at least where 
 PRIOR_SHARE = 1.0  # spread of a parameter without a stated standard deviation, relative to its size
 
 
-STARTS = ("nominal", "ls")
-"""Models that first instruments may come from: the one in use, or that of least squares."""
+STARTS = ("nominal", "ls")  # models that first instruments may come from: the one in use, or that of least squares
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -160,8 +160,7 @@ def feedback_notes(found: Feedback | None) -> Sequence[str]:
     ]
 
 
-ROUNDING = 1e-12
-"""Added to correlations, of which some are nearly one."""
+ROUNDING = 1e-12  # added to correlations, of which some are nearly one
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -28,8 +28,7 @@ CALLED_ORDER_S = 10.0  # mean time between orders below which they are too fast 
 FARTHEST_DANGER_M = 5000.0  # distance up to which the nearest danger is stated [m]
 
 
-HEADS = ("helm", "until the heading has changed by", "about, s")
-"""Heads of the columns of `heading_rows`."""
+HEADS = ("helm", "until the heading has changed by", "about, s")  # heads of the columns of `heading_rows`
 HELM_STEMS = ("rudder", "a")
 SIDES = ("starboard", "port")
 

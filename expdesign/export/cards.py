@@ -95,8 +95,7 @@ STEADY_HEADING_RAD = math.radians(3.0)
 STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
 
 
-BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")
-"""Blanks to be filled in at every run."""
+BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")  # blanks to be filled in at every run
 
 
 @dataclass(frozen=True, kw_only=True)

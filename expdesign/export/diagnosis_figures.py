@@ -161,8 +161,7 @@ def _time(found: Diagnosis) -> tuple[Array, str]:
     return found.windows.time_s[:, :: found.windows.steps_per_sample] / 60, "time [min]"
 
 
-BINS, FEWEST = 16, 15
-"""Largest number of groups, and smallest number of samples in each."""
+BINS, FEWEST = 16, 15  # largest number of groups, and smallest number of samples in each
 ACCELERATION_AXES = {
     "u": ("u [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
     "v": ("v [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),

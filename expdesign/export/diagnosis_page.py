@@ -42,8 +42,7 @@ SMALLEST_P_VALUE = 1e-12  # p-values below are printed as this bound in tables
 
 # Names of causes and estimates in words, in place of "thrust_gain" or "lag_all_s".
 
-TITLES = {cause.name: cause.title for cause in CAUSES}
-"""Cause -> title; other causes have their name as title."""
+TITLES = {cause.name: cause.title for cause in CAUSES}  # cause -> title; other causes have their name as title
 NAMES = {
     "north_mps": "velocity to the north",
     "east_mps": "velocity to the east",

@@ -12,8 +12,7 @@ from expdesign.export.files import finite, strict_json, vessel_toml
 from expdesign.export.files.text import named_finite
 from expdesign.export.roll_changes import RollVerdict, roll_entry, roll_sentences, with_roll
 
-SMALL = 1e-99
-"""p-values below are printed as this bound: they are beyond floating-point accuracy."""
+SMALL = 1e-99  # p-values below are printed as this bound: they are beyond floating-point accuracy
 
 
 def diagnosis_json(found: Diagnosis, roll: RollVerdict | None = None) -> str:

@@ -29,8 +29,7 @@ UNITS = {
     "h": "h",
 }
 """Last part of the name of a fact -> printed unit."""
-UNKNOWN, NONE = "-", "none"
-"""Of facts without a value, and of lists of nothing."""
+UNKNOWN, NONE = "-", "none"  # of facts without a value, and of lists of nothing
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -129,8 +129,7 @@ def _names(best: Assessed, chosen: np.ndarray) -> str:
     return " and ".join(name for name, is_in in zip(best.one_step.outputs, chosen, strict=True) if is_in)
 
 
-FACTOR = 1.959964
-"""Standard deviations to either side that hold 95 % of a normal distribution."""
+FACTOR = 1.959964  # standard deviations to either side that hold 95 % of a normal distribution
 LIMIT_HEADER = (
     "Run", "Output", "Fit", "Constant force", "Slow forces", "Fast forces, noise", "Parameter uncertainty",
     "Fit limit by noise", "Error growth over the run", f"Error of {AHEAD_S:g} s prediction",

@@ -26,8 +26,7 @@ from expdesign.foresight import TOLD_APART, AddedRuns, Detectability, Foreseen, 
 
 NONE = "\N{EN DASH}"
 HALF = 0.5
-MOST_LISTED = 5
-"""Largest number of causes in a sentence."""
+MOST_LISTED = 5  # largest number of causes in a sentence
 HEADER = (
     "Cause",
     "Least visible as",
@@ -299,8 +298,7 @@ def _pairs(found: Foresight) -> list[tuple[str, ...]]:
 
 OPERATION_HEADER = ("Change", "By", "Found", "95 %", "Median delay", "Named rightly", "Or as likely", "Else taken for")
 """Columns of the table for people."""
-FINDS = 0.5
-"""Share of voyages from which a change counts as found."""
+FINDS = 0.5  # share of voyages from which a change counts as found
 
 
 def operation_row(item: Detectability) -> tuple[str, ...]:

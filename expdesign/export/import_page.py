@@ -25,8 +25,7 @@ from expdesign.importing import Mapping as Decisions
 from expdesign.values import Array
 from expdesign.vessel import response_keys, stem
 
-MOST_POINTS = 4000
-"""Of a line in a figure."""
+MOST_POINTS = 4000  # of a line in a figure
 MOST_TEXTS = 12
 DEGREES = 180.0 / np.pi
 

@@ -15,8 +15,7 @@ from expdesign.export.words import counted, ship
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
 
-HARDLY = 0.5
-"""Relative standard deviation from which a parameter is said to be hardly determined."""
+HARDLY = 0.5  # relative standard deviation from which a parameter is said to be hardly determined
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -26,17 +26,13 @@ from expdesign.monitoring import (
 from expdesign.values import Array
 from expdesign.vessel.quantities import GYRO
 
-ALIKE = 0.95
-"""Correlation of scores from which two changes count as not distinguishable."""
+ALIKE = 0.95  # correlation of scores from which two changes count as not distinguishable
 CLEAR, LARGE = 4.0, 0.5
 """Standard errors and sizes by which the ship of the reference differs from its file, from which a sentence says so."""
-SHOWN_CALLS = 5
-"""Largest number of port calls that are listed, the latest."""
-CLEAR_LOAD = 2.0
-"""Standard errors from which a change of the load is reported."""
+SHOWN_CALLS = 5  # largest number of port calls that are listed, the latest
+CLEAR_LOAD = 2.0  # standard errors from which a change of the load is reported
 MUCH_LEFT_OUT, HALF = 0.05, 0.5
-MOST_NAMES = 3
-"""Largest number of changes that a sentence names."""
+MOST_NAMES = 3  # largest number of changes that a sentence names
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -118,10 +118,8 @@ def budget_entries(content: MonitorContent) -> list[dict[str, object]]:
     ]
 
 
-SHOWN = 5
-"""Largest number of estimates that are drawn."""
-MOST_LINEAR = 8.0
-"""Statistic in thresholds, above which its scale is logarithmic."""
+SHOWN = 5  # largest number of estimates that are drawn
+MOST_LINEAR = 8.0  # statistic in thresholds, above which its scale is logarithmic
 
 
 @page_figure

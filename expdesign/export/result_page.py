@@ -18,13 +18,10 @@ from expdesign.export.document import Document, Mark, Table, filled, section
 from expdesign.export.files.text import Entry
 from expdesign.export.indices_form import shown
 
-FEW = 0.9
-"""Share of the time of the planned runs below which the data do not hold all of them."""
-CHANCE = 0.05
-"""Probability that any parameter is said to differ from the vessel file where none does."""
+FEW = 0.9  # share of the time of the planned runs below which the data do not hold all of them
+CHANCE = 0.05  # probability that any parameter is said to differ from the vessel file where none does
 SIGNED_BY = ("Trial master", "Owner", "Class")
-SPACES = tuple("_" * letters for letters in (30, 14, 30))
-"""For name, date and signature."""
+SPACES = tuple("_" * letters for letters in (30, 14, 30))  # for name, date and signature
 MOTIONS = dict(zip(OUTPUTS, ("surge", "sway", "yaw rate"), strict=True))
 
 # Entries of plan.json, of estimate.json and of indices.json.

@@ -34,8 +34,7 @@ SCALED_HEADER = ("Parameter", "At full scale", "95 % interval", "Unit")
 CURE_HEADER = ("What more", "Directions left open", "Smallest relative sensitivity")
 EFFECT_WORDS = {"quadratic": "damping by the square", "forward": "the sensor's place", "tilt": "the sensor's tilt"}
 NORMAL = 1.96
-LEAST_CHANCE = 1e-4
-"""Smallest probability that is written out."""
+LEAST_CHANCE = 1e-4  # smallest probability that is written out
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -34,10 +34,8 @@ AGREEING_STD = 0.10
 BIASED = 0.5  # bias over standard deviation beyond which an estimator does not count as consistent
 
 
-CHANCE = 0.01
-"""Probability that a bias, or a wrong standard deviation, is reported where there is none."""
-ERROR_LIMIT = 1.5
-"""Normalised error below which the thesis calls a trial good."""
+CHANCE = 0.01  # probability that a bias, or a wrong standard deviation, is reported where there is none
+ERROR_LIMIT = 1.5  # normalised error below which the thesis calls a trial good
 
 
 def chance(result: Validated) -> float:

@@ -14,8 +14,7 @@ from expdesign.values import Array
 DAY = ("day_s", "day_median_s", "day_95_s")
 """Keys of a plan's length from start to goal, as planned and in simulated trials."""
 
-SAME_S = 3.0
-"""Difference of days that is zero in tenths of a minute [s]."""
+SAME_S = 3.0  # difference of days that is zero in tenths of a minute [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,8 +19,7 @@ NOTICED = 0.02  # relative differences below this are not reported
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 MOST_DECIMALS = 12
 HOUR = 3600.0
-SINCE_1970_S = 3e8
-"""From which times of the data can only count from 1970 [s]: they are later than 1979."""
+SINCE_1970_S = 3e8  # from which times of the data can only count from 1970 [s]: they are later than 1979
 MINUS, NB = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
@@ -180,8 +179,7 @@ IN_NAMES = {
     "s": (f"{NB}s", 1.0),
 }
 """Ending of a setting's name -> unit that people read in the name of a manoeuvre, and factor to it."""
-ADDED = re.compile(r"added-\d+-.+")
-"""Names that a search gives to the manoeuvres it adds."""
+ADDED = re.compile(r"added-\d+-.+")  # names that a search gives to the manoeuvres it adds
 
 
 def family(name: str) -> str:

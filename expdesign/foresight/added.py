@@ -25,8 +25,7 @@ MOST_ADDED_RUNS = 200  # of one manoeuvre
 HEADINGS = 2  # of every manoeuvre that may be added
 
 
-ENDLESS = 1e5
-"""Number of runs of every manoeuvre that stands for unlimited data."""
+ENDLESS = 1e5  # number of runs of every manoeuvre that stands for unlimited data
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

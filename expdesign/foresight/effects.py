@@ -179,10 +179,8 @@ OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoo
 """Of the standard trials, whose change matters."""
 WORDS = dict(zip(OUTCOMES, ("advance", "tactical diameter", "10/10 overshoot", "20/20 overshoot"), strict=True))
 ZIGZAGS = (math.radians(10.0), math.radians(20.0))
-PROPORTIONAL = ("theta:", "term:")
-"""Effects in proportion to their size."""
-NEGLIGIBLE = 1e-6
-"""Loss of fit [points] that counts as none."""
+PROPORTIONAL = ("theta:", "term:")  # effects in proportion to their size
+NEGLIGIBLE = 1e-6  # loss of fit [points] that counts as none
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -42,15 +42,11 @@ from expdesign.simulation import Environment, draw_environment
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Vessel
 
-SIZES = (0.02, 0.05, 0.1, 0.2)
-"""Relative changes of the ship that are simulated."""
-REFERENCES, REFERENCE_S = 8, 7200.0
-"""Voyages of the reference, and their length [s]."""
-LARGEST_ANGLE_RAD, LARGEST_TURN = 0.6, 0.3
-"""Of rudders and azimuths on voyages, and share of the largest turning force."""
+SIZES = (0.02, 0.05, 0.1, 0.2)  # relative changes of the ship that are simulated
+REFERENCES, REFERENCE_S = 8, 7200.0  # voyages of the reference, and their length [s]
+LARGEST_ANGLE_RAD, LARGEST_TURN = 0.6, 0.3  # of rudders and azimuths on voyages, and share of the largest turning force
 DAY_S, LEVEL = 86_400.0, 0.95
-MOST_VOYAGES = 10_000
-"""Seeds apart between changes."""
+MOST_VOYAGES = 10_000  # seeds apart between changes
 
 
 @dataclass(frozen=True, kw_only=True)

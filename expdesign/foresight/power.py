@@ -27,10 +27,8 @@ DRAWS = 2000  # of score vectors, for the probability that one cause comes befor
 HELD_OUT_DRAWS = 60  # of trials, for the share in which held-out runs show what the test accepts
 
 
-SHAPES = ("roll:period", "roll:damping")
-"""Fixed effects of a candidate that its fit estimates too."""
-TINY = 1e-300
-"""Least squared error that has a logarithm."""
+SHAPES = ("roll:period", "roll:damping")  # fixed effects of a candidate that its fit estimates too
+TINY = 1e-300  # least squared error that has a logarithm
 
 
 def level_of(multiplicity: float) -> float:

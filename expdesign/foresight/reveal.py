@@ -35,8 +35,7 @@ from expdesign.simulation import Environment
 from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel, VesselModel
 
-NOT_BY_RUNS = ("change_point",)
-"""Causes that are shown by when runs are sailed, not by which."""
+NOT_BY_RUNS = ("change_point",)  # causes that are shown by when runs are sailed, not by which
 
 
 @sealed(each="q d d", prior="d d")

@@ -23,8 +23,7 @@ BLOCKS = 8
 FEWEST = 4  # blocks that must agree
 SAME = 0.8  # least squared correlation of one quantity that tells a zone
 QUARTER_S, FARTHEST_ZONE_S = 900.0, 14.5 * 3600.0  # of which zones are multiples, and the farthest of them
-ROLLOVER_S = 1024 * 7 * 86400.0
-"""After so long a receiver that knows ten bits of the week begins anew."""
+ROLLOVER_S = 1024 * 7 * 86400.0  # after so long a receiver that knows ten bits of the week begins anew
 STEP_S = (0.05, 1.0)  # of the series that are compared, at least and at most [s]
 NEAR_S = 120.0  # by which a computer's clock may be off [s]
 LIKE = 0.3  # least squared correlation that tells a lag

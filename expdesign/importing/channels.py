@@ -25,16 +25,13 @@ RESET_S, RESET_STEPS = 2.0, 10.0
 """A step back in time of more than both, in seconds and usual steps, is a clock that began anew."""
 STRAY_ROWS = 10
 """Rows at most whose stamps are out of place where those before and after them go on: a bit was lost, a row is old."""
-DATED_S = 1e8
-"""Times beyond count from 1970, so that each is right by itself."""
+DATED_S = 1e8  # times beyond count from 1970, so that each is right by itself
 TIME = " time"  # of rows, as no field is named
-RESTART_GAP_S = 60.0
-"""Put between readings before and after a clock began anew [s]."""
+RESTART_GAP_S = 60.0  # put between readings before and after a clock began anew [s]
 ALIKE = 0.8  # share of channels by which two files are of one logger
 OVERLAP_S = 2.0  # by which the next file of a logger may begin before the end of the one before
 DAY_S = 86400.0
-LARGEST = 1e20
-"""No reading of any quantity in any unit is as large; times in ns since 1970 are 2e18."""
+LARGEST = 1e20  # no reading of any quantity in any unit is as large; times in ns since 1970 are 2e18
 MOST_NUMBERS = 60_000_000
 """Readings and times that are kept of all logs of an import; see tests/benchmarks/imported_day.py for the memory."""
 

@@ -34,8 +34,7 @@ FILLS = np.array([
 ])  # fmt: skip
 """Sizes of numbers that stand for no reading: nines; of AIS (ITU-R M.1371: speed 102.3, heading 511, position 91 and
 181, rate of turn 128); the largest of integers, plain and scaled."""
-APART = 1.2
-"""Ratio to the largest of other readings beyond which one of these is no reading."""
+APART = 1.2  # ratio to the largest of other readings beyond which one of these is no reading
 MOST = 0.95  # share of readings that may be fills, else these are readings
 
 
@@ -99,8 +98,7 @@ MOST_DEGREES = {"lat_deg": 90.0, "lon_deg": 180.0}
 TURN_DEG = 360.5
 MOST_HELM_DEG, MOST_PERCENT = 75.0, 101.0
 SWAPPED = "no place"
-RADIANS_RATIO = 0.1
-"""Way by positions over that by speed below which positions, read in degrees, are in radians."""
+RADIANS_RATIO = 0.1  # way by positions over that by speed below which positions, read in degrees, are in radians
 DECIMALS = 2  # most decimals of an angle that is taken for degrees
 SURE = 0.9  # share that a comparison must explain before it questions a unit that is stated
 FIT = 0.3  # share that a comparison must explain before it tells a unit

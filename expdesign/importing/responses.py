@@ -25,8 +25,7 @@ from expdesign.records.file import REACHED, is_input, is_turning_input
 from expdesign.values import Array
 
 EARTH_M_PER_DEG = 111195.0
-THIRD = math.sqrt(20.0)
-"""Standard deviation of third differences of white noise of one."""
+THIRD = math.sqrt(20.0)  # standard deviation of third differences of white noise of one
 STEPS = 2000
 WHOLE = 0.98
 DITHERED = 0.3  # noise over rounding above which means of readings are finer than the rounding

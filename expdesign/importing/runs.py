@@ -24,10 +24,8 @@ from expdesign.simulation.helm import Helm
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
 
-QUIET_LENGTHS, QUIET_S = 3.0, (5.0, 60.0)
-"""Way in ship lengths, and time [s], that a pause between two runs must last."""
-FROUDE = 0.2
-"""Of a ship whose length is not known: length = speed^2 / (g Froude^2)."""
+QUIET_LENGTHS, QUIET_S = 3.0, (5.0, 60.0)  # way in ship lengths, and time [s], that a pause between two runs must last
+FROUDE = 0.2  # of a ship whose length is not known: length = speed^2 / (g Froude^2)
 HELM_SHARE, LEAST_HELM = 0.25, {"rad": math.radians(3.0), "tau": 0.05}
 """Share of the largest helm, and least helm, that is steering for a trial and not for a course."""
 DRIVE_SHARE = 0.1  # change of the engine order, by its largest, that begins a run
@@ -210,8 +208,7 @@ def file_name(number: int, run: Run) -> str:
 
 BY = {"": "", "rudder": "", "force": "", "azimuth": " by azimuths", "propeller": " by differential thrust"}
 """How a ship steers, as `Helm` has it -> words behind the name of a trial."""
-STEERED = (("rudder", "helm"), ("a", "azimuths"), ("tau_psi", "helm"))
-"""Stem of inputs -> words where they change."""
+STEERED = (("rudder", "helm"), ("a", "azimuths"), ("tau_psi", "helm"))  # stem of inputs -> words where they change
 ON_THE_LINE: Mapping[str, float] = {}
 """All propellers on the centre line."""
 

@@ -45,8 +45,7 @@ TIME_NAME = re.compile(
 )
 ZONE_NAME = re.compile(r"\b(?:UTC|GMT)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
 """A zone in the name of a column, as `Time (UTC+2)`."""
-EARLIEST_S, LATEST_S = 7.9e8, 2.21e9
-"""Of times since 1970: the years 1995 to 2040 [s]."""
+EARLIEST_S, LATEST_S = 7.9e8, 2.21e9  # of times since 1970: the years 1995 to 2040 [s]
 EPOCHS = (
     (1e-9, 0.0, "ns since 1970"), (1e-6, 0.0, "us since 1970"), (1e-3, 0.0, "ms since 1970"),
     (1.0, 0.0, "s since 1970"),
@@ -71,10 +70,8 @@ UNIT_WORDS = {
     3600.0: "in h",
     DAY_S: "in days",
 }
-LONGEST_STEP_S = 20.0
-"""Usual step of numbers without unit beyond which these are milliseconds, or a thousandth of that."""
-SHORTEST_STEP_S = 5e-4
-"""Usual step of numbers without unit below which these are days: no log has 2,000 rows a second."""
+LONGEST_STEP_S = 20.0  # usual step of numbers without unit beyond which these are milliseconds, or a thousandth of that
+SHORTEST_STEP_S = 5e-4  # usual step of numbers without unit below which these are days: no log has 2,000 rows a second
 WEEK_S = 7 * DAY_S
 GPS_EPOCH_S = 315_964_800.0
 LEAP_S = ((1_483_228_800.0, 18.0), (1_435_708_800.0, 17.0), (1_341_100_800.0, 16.0), (1_230_768_000.0, 15.0),
@@ -250,8 +247,7 @@ def _is_hhmmss(known: Array) -> bool:
     return bool(parts and known.max(initial=0) >= 1e4 and (jumps.any() or (known.min() > 1e4 and step < 20)))
 
 
-DATE_NUMBERS = (19700101, 21001231)
-"""Least and greatest number that is a year, month and day run together."""
+DATE_NUMBERS = (19700101, 21001231)  # least and greatest number that is a year, month and day run together
 UTC, LOCAL = r"\b(utc|gps|gnss|gmt|zulu)\b", r"\blocal\b"
 PARTS = ("year", "month", "day", "hour", "minute", "second")
 PART_WORDS = {"yyyy": "year", "yr": "year", "mon": "month", "mm": "month", "dd": "day", "hh": "hour", "hr": "hour",

@@ -47,8 +47,7 @@ class NotStandard:
 
 
 Found = Circle | ZigZag | Stop | NotStandard
-WIDEST_SWING_RAD = math.pi / 2
-"""Heading, from the approach course, to which a zig-zag goes at most."""
+WIDEST_SWING_RAD = math.pi / 2  # heading, from the approach course, to which a zig-zag goes at most
 
 
 def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float = 0.0) -> Found:

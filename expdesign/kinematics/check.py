@@ -195,8 +195,7 @@ SCALES = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_O
 """Findings that are undone -> columns of the velocity that are divided by them."""
 OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if not row.is_gain}
 """Findings that are undone -> columns of the velocity that they are taken off."""
-LATE = "velocity_delay_s"
-"""A finding that is undone where it is positive: then one instrument is late by two others."""
+LATE = "velocity_delay_s"  # a finding that is undone where it is positive: then one instrument is late by two others
 OF_LOG = (
     *(row.key for row in GAINS_AND_OFFSETS if row.shown_by == LOG),
     *(LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m"),

@@ -146,8 +146,7 @@ def _waves(ship: Vessel, sailed: Trajectory, frequency: Array) -> Array:
 SMALL_SHARE = 0.01
 
 
-WEIGHED = ("m", "z_m")
-"""Parameters of an unknown load."""
+WEIGHED = ("m", "z_m")  # parameters of an unknown load
 
 
 @sealed(theta="9", size="p", prior="p p")
@@ -248,8 +247,7 @@ def _name(load: Load | None) -> str:
 LEAST_EFFICIENCY = 0.9  # D-efficiency that a plan with fewer loads keeps, of the best with all candidates
 
 
-BY_VOLUME = Aim()
-"""D: the volume of the confidence region of all parameters."""
+BY_VOLUME = Aim()  # D: the volume of the confidence region of all parameters
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,17 +39,14 @@ SEARCHED_STRETCHES = 600  # of a reference, from which the variation of the forc
 SEARCH_ITERATIONS, SEARCH_GAIN, SEARCH_STEP = 30, 1e-5, 0.01
 MOST_QUICK = 6.0  # largest variance of the quick part in that of independent stretches, in powers of two
 
-LEAST_VARIANCE = 1e-14
-"""Of a force that is none."""
+LEAST_VARIANCE = 1e-14  # of a force that is none
 ROUGHER = ((2.0, False), (5.0, False), (3.0, True))
 """Standard deviations of the force in other weathers, in those of the reference, and whether it lasts `LASTING_S`."""
 WINDIER = 2.0
 """Standard deviation of winds in another weather, in the larger of those that they may have and of quick forces."""
 LASTING_S = 900.0
-PUSHES = 3
-"""Accelerations among the components of the force, the last of them."""
-LEAST_SURPRISE = 0.1
-"""Of a stretch on average, where the reference shows no force."""
+PUSHES = 3  # accelerations among the components of the force, the last of them
+LEAST_SURPRISE = 0.1  # of a stretch on average, where the reference shows no force
 
 
 @sealed(

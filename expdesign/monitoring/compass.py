@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 from expdesign.monitoring.noise import Noise
 from expdesign.values import Array
 
-RATE, HEADING = 2, 3
-"""Channels of the yaw rate and of the rate of the heading."""
-APART = 2
-"""Samples between those that are compared: sums of central differences share every second heading."""
+RATE, HEADING = 2, 3  # channels of the yaw rate and of the rate of the heading
+APART = 2  # samples between those that are compared: sums of central differences share every second heading
 
 
 def turned(

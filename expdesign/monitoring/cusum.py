@@ -42,8 +42,7 @@ LOAD_SETTLED = (2, 6, 20, 60, 240)  # stretches after a port call from which its
 # A load is a change of inertia and hull that lasts until the next call. The filter of the unmeasured force estimates it
 # too, so that it is in no score of a change; that of a change which looks like a load grows only as the load is known.
 
-MOST_CALLS = 100
-"""Kept for the page."""
+MOST_CALLS = 100  # kept for the page
 
 
 def called(state: State, calibration: Calibration, until_s: float) -> State:

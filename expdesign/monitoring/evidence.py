@@ -46,10 +46,8 @@ STARTS = 3
 KINDS = ("steady course", "turning", "changing speed", "turning and changing speed")
 """Of stretches, by what the ship does in them."""
 CURRENT = ("current:north", "current:east")
-FEWEST_ROWS = 4
-"""Of a batch that is simulated."""
-PER_CURRENT = 1e-3
-"""Difference of a current for its sensitivity [m/s]."""
+FEWEST_ROWS = 4  # of a batch that is simulated
+PER_CURRENT = 1e-3  # difference of a current for its sensitivity [m/s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,10 +20,8 @@ from expdesign.roll.record import RollJudgement, judge_roll, record_estimate
 from expdesign.values import Array
 from expdesign.vessel import RollPendulum, Vessel
 
-MOST_TOLD = 100
-"""Changes that are kept, the latest."""
-PORT_P = 0.01
-"""Chance of a change of the load that is told after a port call where there is none."""
+MOST_TOLD = 100  # changes that are kept, the latest
+PORT_P = 0.01  # chance of a change of the load that is told after a port call where there is none
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,21 +27,15 @@ from expdesign.progress import Progress, silent
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-STEP = 0.05
-"""Change of an unknown for its derivative."""
+STEP = 0.05  # change of an unknown for its derivative
 MOST_FITS = 25
-DOUBTFUL = 3.0
-"""Standard deviations from what all other values say, from which a value contradicts them."""
-DRAWS = 240
-"""Ships that are drawn for the intervals of predictions."""
-SAME_SPEED = 0.03
-"""Share within which two speeds or orders count as one."""
-NEAR_SPEED = 0.10
-"""Share within which a standard trial is left out beside a stated one."""
+DOUBTFUL = 3.0  # standard deviations from what all other values say, from which a value contradicts them
+DRAWS = 240  # ships that are drawn for the intervals of predictions
+SAME_SPEED = 0.03  # share within which two speeds or orders count as one
+NEAR_SPEED = 0.10  # share within which a standard trial is left out beside a stated one
 KINDS = ("speed", "circle", "zigzag", "stop", "spin", "drift")
 APPROACHED = ("circle", "zigzag", "stop")
-PITCH = (0.45, 1.55)
-"""Pitch ratios that propellers have."""
+PITCH = (0.45, 1.55)  # pitch ratios that propellers have
 
 
 @dataclass(frozen=True, kw_only=True)

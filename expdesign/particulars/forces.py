@@ -27,12 +27,9 @@ from expdesign.errors import InputError
 from expdesign.particulars.card import AIR_KGPM3, WATER_KGPM3, Card, Rudder, Thruster
 from expdesign.particulars.hull import G_MPS2, Fin, Force, hull_forces, resistance
 
-EFFICIENCY = 0.6
-"""Resistance times speed by power on the shafts."""
-USUAL_PITCH = 0.9
-"""Pitch by diameter of a propeller of which only the power or the top speed is known."""
-FROUDE = 0.2
-"""Froude number of a ship of which neither speed nor power is known."""
+EFFICIENCY = 0.6  # resistance times speed by power on the shafts
+USUAL_PITCH = 0.9  # pitch by diameter of a propeller of which only the power or the top speed is known
+FROUDE = 0.2  # Froude number of a ship of which neither speed nor power is known
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,7 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 EQUATIONS = {"u": "X", "v": "Y", "r": "N"}
-SAMPLES = 8
-"""While she sails her length."""
+SAMPLES = 8  # while she sails her length
 OWN_SCATTER = 0.03
 """Standard deviation of each parameter by itself, by its value: what a projection on few terms leaves out."""
 RANGES = (

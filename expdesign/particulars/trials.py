@@ -18,10 +18,8 @@ from expdesign.simulation.program import RatesProgram
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Vessel
 
-STEPS_PER_LENGTH = 16
-"""Steps in the time in which she sails her length."""
-LONGEST = 60.0
-"""Ship lengths at approach speed after which a trial is given up."""
+STEPS_PER_LENGTH = 16  # steps in the time in which she sails her length
+LONGEST = 60.0  # ship lengths at approach speed after which a trial is given up
 
 Results = dict[str, Array]
 

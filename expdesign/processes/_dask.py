@@ -27,14 +27,10 @@ COMPARED = ("casadi", "clarabel", "cvxpy", "numba", "numpy", "ompl", "scipy", "s
 """Packages that results may depend on, besides our own: workers have the versions that are here."""
 LOGGERS = ("distributed", "distributed.client", "distributed.batched", "distributed.core", "distributed.comm")
 """They tell of lost connections, each in its own words."""
-CONNECT_S = 4.0
-"""In which a scheduler must answer at first, and again after the connection broke."""
-LOOK_S = 5.0
-"""Without a finished task, after which the scheduler is asked whether it and its workers are there."""
-ANSWER_S = 20.0
-"""In which it must answer then."""
-IDLE_S = 60.0
-"""After which work without any worker is given up; workers that died are mostly started again sooner."""
+CONNECT_S = 4.0  # in which a scheduler must answer at first, and again after the connection broke
+LOOK_S = 5.0  # without a finished task, after which the scheduler is asked whether it and its workers are there
+ANSWER_S = 20.0  # in which it must answer then
+IDLE_S = 60.0  # after which work without any worker is given up; workers that died are mostly started again sooner
 
 
 @contextmanager

@@ -49,8 +49,7 @@ if TYPE_CHECKING:
 
 ONE_AT_A_TIME = threading.Lock()
 """Held by the task of this process: solvers and their random numbers are not made for threads."""
-IDLE_S = 300.0
-"""After which processes without work end, so that none outlives a program that was killed."""
+IDLE_S = 300.0  # after which processes without work end, so that none outlives a program that was killed
 GROWN_BYTES = 2_000_000_000
 """By which a process may grow before another takes its place: programs that are built once are kept, which is no leak.
 """
@@ -173,10 +172,8 @@ def _without_interruptions() -> Iterator[None]:
 Result = TypeVar("Result")
 Item = TypeVar("Item")
 
-SLOW_S = 1.0
-"""From which a task was long in coming."""
-ALONE_S = 5.0
-"""Time from which tasks that come one by one are worth other processes."""
+SLOW_S = 1.0  # from which a task was long in coming
+ALONE_S = 5.0  # time from which tasks that come one by one are worth other processes
 _PLACE: ContextVar[Processes | Cluster | None] = ContextVar("_PLACE", default=None)
 """Where the work of a block is shared; None for this process alone."""
 
@@ -335,8 +332,7 @@ def ahead(
             yield item, result_of(place.outcome(future))
 
 
-LOOK_S = 0.2
-"""Between two looks at the reports."""
+LOOK_S = 0.2  # between two looks at the reports
 
 
 @dataclass(frozen=True)

@@ -26,18 +26,14 @@ from expdesign.signals import AUXILIARY
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
-STREAM = Path("-")
-"""Stands for the standard input."""
-CLOCKED_ROWS = 50
-"""From which the time between samples is learnt."""
-LINES = 4096
-"""Looked at together."""
+STREAM = Path("-")  # stands for the standard input
+CLOCKED_ROWS = 50  # from which the time between samples is learnt
+LINES = 4096  # looked at together
 WIND_COLUMNS = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad")
 OPTIONAL = (*WIND_COLUMNS, "depth_m", "steered", "batch", *AUXILIARY)
 
 
-CORRECTED_SHARE = 0.005
-"""Share of the steps, at most, that corrections of a clock are."""
+CORRECTED_SHARE = 0.005  # share of the steps, at most, that corrections of a clock are
 
 
 @dataclass(frozen=True)

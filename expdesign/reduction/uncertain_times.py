@@ -17,10 +17,8 @@ from expdesign.simulation import SampleMap, deliver_through, mapped, positions
 from expdesign.values import Array
 from expdesign.vessel import Response
 
-SMALL = 1e-4
-"""Change that derivatives are taken by: of a time, in samples; of a slew rate, as a share of it."""
-TIMES = ("delay_s", "lag_s", "rate")
-"""Fields of `Response` that may be uncertain and that inputs have derivatives by."""
+SMALL = 1e-4  # change that derivatives are taken by: of a time, in samples; of a slew rate, as a share of it
+TIMES = ("delay_s", "lag_s", "rate")  # fields of `Response` that may be uncertain and that inputs have derivatives by
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,8 +50,7 @@ CHUNK_TRIALS = 20  # trials in one chunk; each chunk has its own random stream
 SINGLE_TRIALS = 5  # those of random runs, simulated trial by trial: processes share smaller chunks more evenly
 
 RANDOM = "random"
-GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
-"""Angle from the heading of one run to that of the next."""
+GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)  # angle from the heading of one run to that of the next
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

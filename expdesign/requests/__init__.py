@@ -89,8 +89,7 @@ def command_text(request: Request) -> str:
     return shlex.join(["expdesign", command.name, *arguments, *options])
 
 
-WITHOUT_EFFECT = ("out", "jobs", "scheduler", "no_cache")
-"""Values on which no result depends."""
+WITHOUT_EFFECT = ("out", "jobs", "scheduler", "no_cache")  # values on which no result depends
 
 
 def repeating(request: Request, *, keep: Collection[str] = ()) -> str:

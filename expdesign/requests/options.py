@@ -190,10 +190,8 @@ DataFiles = Annotated[
 SEED = Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result.")
 Seed = Annotated[int, SEED]
 StatedSeed = Annotated[int, replace(SEED, stated=True)]
-MOST_TRIALS = 100_000
-"""Simulated trials of a design, or of a manoeuvre, at most."""
-MOST_VOYAGES = 1000
-"""Simulated voyages of each change in operation, at most."""
+MOST_TRIALS = 100_000  # simulated trials of a design, or of a manoeuvre, at most
+MOST_VOYAGES = 1000  # simulated voyages of each change in operation, at most
 Jobs = Annotated[int, Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")]
 Scheduler = Annotated[
     str | None,

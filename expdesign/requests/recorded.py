@@ -304,8 +304,7 @@ class Diagnose(Request):
     seed: StatedSeed = 0
 
 
-MOST_WIND_MPS = 100.0
-"""Of a mean wind; no trial is held in more."""
+MOST_WIND_MPS = 100.0  # of a mean wind; no trial is held in more
 
 
 class Indices(Request):

@@ -33,8 +33,7 @@ UNITS = {
     "z_f": "m", "m": "kg", "z_m": "m",
 }  # fmt: skip
 """Parameter -> unit."""
-PARAMETERS = tuple(UNITS)
-"""Names of the parameters, in the order of all their vectors (9,)."""
+PARAMETERS = tuple(UNITS)  # names of the parameters, in the order of all their vectors (9,)
 MEANINGS = {
     "k": "restoring moment of hull and speed, without the weight's share g S1",
     "A_x": "roll inertia about the centre of mass, added inertia included",

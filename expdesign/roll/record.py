@@ -20,8 +20,7 @@ from expdesign.values import Array
 from expdesign.vessel import IDEAL, ROLL_PARAMETERS, RollPendulum, Vessel
 from expdesign.vessel.roll import G_MPS2, Body, Load
 
-NEEDED = ("roll_rate_radps", "imu_lateral_mps2")
-"""Columns needed besides r_radps and the rudder."""
+NEEDED = ("roll_rate_radps", "imu_lateral_mps2")  # columns needed besides r_radps and the rudder
 
 
 def missing_columns(batch: Batch) -> tuple[str, ...]:
@@ -114,12 +113,9 @@ def _rudders(names: tuple[str, ...], asked: Sequence[str]) -> tuple[str, ...]:
 # P. Hansen, Econometrica 50 (1982), 1029-1054, for the test; H. Hotelling, Annals of Mathematical Statistics 2 (1931),
 # 360-378, for its distribution.
 
-ALARM_P = 0.01
-"""Chance that a change is reported where there is none."""
-ENOUGH_P = 0.01
-"""Probability of a larger remainder where the cause is right, below which the cause is not accepted."""
-ALIKE = 6.0
-"""Difference of sums of squares up to which two explanations cannot be distinguished."""
+ALARM_P = 0.01  # chance that a change is reported where there is none
+ENOUGH_P = 0.01  # probability of a larger remainder where the cause is right, below which the cause is not accepted
+ALIKE = 6.0  # difference of sums of squares up to which two explanations cannot be distinguished
 MOST_CAUSES = 2
 LOAD = "load"
 CAUSES = {

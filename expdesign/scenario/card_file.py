@@ -14,12 +14,10 @@ from expdesign.particulars import WATER_KGPM3, Card, Hull, Rudder, Stated, Thrus
 from expdesign.scenario.tables import Entry, Number, Positive, Table, Text, check_table, read_toml
 
 KNOT_MPS = 1852.0 / 3600.0
-SAME_DISPLACEMENT = 0.05
-"""Share by which a displacement may differ from that of a stated block coefficient."""
+SAME_DISPLACEMENT = 0.05  # share by which a displacement may differ from that of a stated block coefficient
 LARGEST_DEG = 90.0
 SHIP_M = 20.0
-SOLAS_DEGPS, SMALL_DEGPS = 2.32, 10.0
-"""Usual rates of rudders, of ships of `SHIP_M` and more, and of smaller craft."""
+SOLAS_DEGPS, SMALL_DEGPS = 2.32, 10.0  # usual rates of rudders, of ships of `SHIP_M` and more, and of smaller craft
 
 
 class ShipTable(Table):
@@ -289,8 +287,7 @@ def _rudder(table: RudderTable, ship: ShipTable, entry: Entry) -> Rudder:
     )  # fmt: skip
 
 
-UNITS = {"m": 1.0, "s": 1.0, "kn": KNOT_MPS, "deg": math.pi / 180}
-"""Ending of a key -> SI."""
+UNITS = {"m": 1.0, "s": 1.0, "kn": KNOT_MPS, "deg": math.pi / 180}  # ending of a key -> SI
 SI_NAMES = {"kn": "mps", "deg": "rad"}
 
 

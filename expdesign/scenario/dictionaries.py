@@ -42,8 +42,7 @@ from expdesign.vessel import Vessel, column_name
 
 SIGNAL = re.compile(r"(n\d+)_rps|(a\d+|rudder\d+)_rad|(tau_x|tau_y|tau_psi)")
 MOTION = ("u_mps", "v_mps", "r_radps")
-SPREAD = 1e-3
-"""Share of a sample time by which steps of time may differ."""
+SPREAD = 1e-3  # share of a sample time by which steps of time may differ
 
 
 def load_recorded(path: Path | str) -> tuple[Commands, dict[str, float]]:

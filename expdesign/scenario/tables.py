@@ -20,10 +20,8 @@ from pydantic_core import ErrorDetails
 from expdesign.errors import FileError, nearest
 from expdesign.input_files import read_text
 
-LARGEST = 1e12
-"""Largest accepted number, far beyond any length, time or speed of a trial."""
-MOST_NAMED = 240
-"""Characters of all known names that are still listed beside the nearest one."""
+LARGEST = 1e12  # largest accepted number, far beyond any length, time or speed of a trial
+MOST_NAMED = 240  # characters of all known names that are still listed beside the nearest one
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
@@ -195,8 +193,7 @@ KIND_WORDS = {
 }
 
 
-UNION_PARTS = ("int", "constrained-str")
-"""Steps of a place that name an alternative type, no key."""
+UNION_PARTS = ("int", "constrained-str")  # steps of a place that name an alternative type, no key
 
 
 def _dotted(place: Iterable[str | int]) -> str:

@@ -19,11 +19,9 @@ from expdesign.simulation.motion import State, integrator_step, motion_rates, tu
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Inertia, Operators, Roll, Term, VesselModel
 
-SHIPS = tuple(1 << power for power in reversed(range(8)))
-"""Number of ships in one function."""
+SHIPS = tuple(1 << power for power in reversed(range(8)))  # number of ships in one function
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
-LARGEST = 16_000
-"""Largest number of instructions in one function; in longer ones a step takes as much time."""
+LARGEST = 16_000  # largest number of instructions in one function; in longer ones a step takes as much time
 
 
 class CompiledIntegrator:

@@ -25,8 +25,7 @@ from expdesign.signals import Batch, Commands
 from expdesign.values import Array, sealed
 from expdesign.vessel import Response, Vessel
 
-FOLLOWED = 1.01
-"""Share of a rate up to which commands count as keeping to it: files round them."""
+FOLLOWED = 1.01  # share of a rate up to which commands count as keeping to it: files round them
 FASTER, COARSEST = 1.5, 0.03
 """Share of a stated rate that a recorded position may move at, and share of its range that its readings may step by."""
 

@@ -28,8 +28,7 @@ from expdesign.simulation.sensors import ROWS, noise_std, observe, prompt
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-STRETCH = 32
-"""Samples for which noise is drawn at once."""
+STRETCH = 32  # samples for which noise is drawn at once
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

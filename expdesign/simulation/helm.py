@@ -30,10 +30,8 @@ SERVICE_SHARE = 0.85 ** (1 / 3)
 FASTEST_MPS = 60.0
 HARD_OVER_RAD = math.radians(35.0)
 HALF_TURN = math.pi
-AT_ONCE = 1e6
-"""Change of the engine order per second that counts as one at once."""
-STEADY = 1e-9
-"""Share of its speed that a steady vessel may gain or lose in a second."""
+AT_ONCE = 1e6  # change of the engine order per second that counts as one at once
+STEADY = 1e-9  # share of its speed that a steady vessel may gain or lose in a second
 
 
 @dataclass(frozen=True, kw_only=True)

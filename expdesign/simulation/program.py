@@ -93,8 +93,7 @@ class Tape:
 
 
 ZERO = Entry("constant", (), 0.0)
-NEUTRAL = {"add": ZERO, "multiply": Entry("constant", (), 1.0)}
-"""Operations that change nothing."""
+NEUTRAL = {"add": ZERO, "multiply": Entry("constant", (), 1.0)}  # operations that change nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +183,7 @@ def _evaluation(written: tuple[tuple[str, tuple[str, ...]], ...]) -> Evaluation:
     )
 
 
-STATES = 6
-"""Number of states of a motion: pose and velocity."""
+STATES = 6  # number of states of a motion: pose and velocity
 
 
 class RatesProgram:

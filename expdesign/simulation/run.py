@@ -127,10 +127,8 @@ def _followed(pendulum: RollPendulum, begin: Array, end: Array, step_s: float) -
 
 SUBSTEPS = 2
 """Runge-Kutta steps per sample; a step is at most a fifth of the fastest time constant of the reference vessels."""
-FEW_RUNS = 50
-"""Up to so many runs are quicker one by one than by an operation on all of them at a time."""
-LARGEST_SPEED = 1e3
-"""Speeds [m/s, rad/s] beyond this mean that the model is unstable."""
+FEW_RUNS = 50  # up to so many runs are quicker one by one than by an operation on all of them at a time
+LARGEST_SPEED = 1e3  # speeds [m/s, rad/s] beyond this mean that the model is unstable
 
 
 def simulate(

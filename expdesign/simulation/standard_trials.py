@@ -27,10 +27,8 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 Trial = tuple[Commands, Trajectory]
-LONGEST = 300.0
-"""Ship lengths at approach speed after which an unfinished trial ends."""
-STILL = np.zeros((1, 4))
-"""Calm water and air."""
+LONGEST = 300.0  # ship lengths at approach speed after which an unfinished trial ends
+STILL = np.zeros((1, 4))  # calm water and air
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,8 +173,7 @@ class _Sample:
 
 
 SIDES = {"starboard": 1, "port": -1}
-MANY = 10_000
-"""Orders of a zig-zag that is limited by its time alone."""
+MANY = 10_000  # orders of a zig-zag that is limited by its time alone
 
 
 AT_SERVICE_SPEED = Conduct()

@@ -16,10 +16,8 @@ CONSTANT_SHARE = 0.02  # of a command's range, within which it counts as held
 LEAST_HOLD_S = 3.0
 LEAST_HOLD_SAMPLES = 6
 
-CHANNELS = ("throttle", "rudder")
-"""Commands; the first drives the speed U, the second the yaw rate r."""
-COLUMNS = ("state", "sway", "commands", "inputs", "heading", "surge")
-"""Of a record, one row for each sample."""
+CHANNELS = ("throttle", "rudder")  # commands; the first drives the speed U, the second the yaw rate r
+COLUMNS = ("state", "sway", "commands", "inputs", "heading", "surge")  # of a record, one row for each sample
 ASTERN_SHARE = 0.5  # of the speed, that is astern where a vessel goes astern
 THROTTLES, RUDDERS = ("n", "tau_x"), ("rudder", "a", "tau_psi")
 

@@ -42,10 +42,8 @@ from expdesign.values import Array
 ENTRY_CONSTANTS, LEAST_ENTRY_SAMPLES = 2.0, 10
 
 
-MEDIAN_OVER_MEAN = math.sqrt(math.pi / 2.0)
-"""Standard error of a median by that of a mean, of normal values."""
-SPEED_DEGREE = 3
-"""Degree of the polynomial in time that the speed follows during a response."""
+MEDIAN_OVER_MEAN = math.sqrt(math.pi / 2.0)  # standard error of a median by that of a mean, of normal values
+SPEED_DEGREE = 3  # degree of the polynomial in time that the speed follows during a response
 
 
 def samples_and_delays(

@@ -21,8 +21,7 @@ from expdesign.values import Array
 # between response and plateau (K. Nomoto et al., On the steering qualities of ships, Int. Shipbuilding Progress 4,
 # 1957).
 
-NARROW_S = 1e-6
-"""Half the distance between the bounds of a dead time that is fixed [s]."""
+NARROW_S = 1e-6  # half the distance between the bounds of a dead time that is fixed [s]
 Curve = Callable[[Array, Array], Array]
 """(parameters, time_s) -> (k,) share of the step that is done."""
 
@@ -198,10 +197,8 @@ SHAPE_STD = (0.4, 0.5)
 MOST_STEPS, TOLERANCE = 6, 1e-5
 WIDTH_S, POINTS, FINE = 0.8, 17, 801
 """Width and points of the grid of dead times around those of first order responses, and points of the finer grid."""
-OWN = 3
-"""Parameters of each step: logarithm of T0, errors of both plateaus in their standard errors."""
-MOST_LOG = 20.0
-"""Largest logarithm during the search: longer times have no effect that a hold could show."""
+OWN = 3  # parameters of each step: logarithm of T0, errors of both plateaus in their standard errors
+MOST_LOG = 20.0  # largest logarithm during the search: longer times have no effect that a hold could show
 
 
 def shared_delay(steps: Sequence[Transient], *, most_s: float) -> tuple[float, float]:

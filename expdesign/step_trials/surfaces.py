@@ -33,8 +33,7 @@ PENALTIES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 FOLDS = 10  # of cross-validation where there is no closed form
 
 
-SMALLEST = 1e-11
-"""Eigenvalue of the normal equations, relative to the largest, below which smaller ones are raised."""
+SMALLEST = 1e-11  # eigenvalue of the normal equations, relative to the largest, below which smaller ones are raised
 
 
 @sealed(columns="n p", values="n", weights="n", penalised="p")
@@ -137,13 +136,10 @@ def _lasso(samples: Sampled, penalty: float) -> Array:
 
 
 EVEN = ((0, 0), (1, 0), (2, 0), (0, 2), (3, 0), (1, 2), (4, 0), (2, 2), (0, 4))
-ODD = ((0, 1), (1, 1), (2, 1), (0, 3), (3, 1), (1, 3))
-"""Powers of U and r."""
+ODD = ((0, 1), (1, 1), (2, 1), (0, 3), (3, 1), (1, 3))  # powers of U and r
 WITH_BIAS = ((0, 0), *ODD)
-STEEPNESS = (2.0, 5.0, 10.0)
-"""a of tanh(a (U - b)), times the range of U."""
-BENDS = (0.1, 0.3, 0.5)
-"""b, as a share of the range of U."""
+STEEPNESS = (2.0, 5.0, 10.0)  # a of tanh(a (U - b)), times the range of U
+BENDS = (0.1, 0.3, 0.5)  # b, as a share of the range of U
 NO_BEND = (0.0, 0.0)
 
 
@@ -264,10 +260,8 @@ def validity_region(states: Array) -> ValidityRegion:
     return ValidityRegion(corners=shapely.get_coordinates(hull), scale=scale)
 
 
-LOW_ORDER = 3
-"""Highest degree of the surface that is compared with."""
-LEAST_PAIRS = 2
-"""Levels reached from both sides, from which hysteresis is judged."""
+LOW_ORDER = 3  # highest degree of the surface that is compared with
+LEAST_PAIRS = 2  # levels reached from both sides, from which hysteresis is judged
 REPEATED_SHARE = 0.003
 """Of a steady state, within which it repeats itself from hour to hour whatever its standard error says."""
 

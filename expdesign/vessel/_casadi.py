@@ -21,12 +21,9 @@ from expdesign.vessel.model import Inertia, VesselModel
 from expdesign.vessel.structures import Operators, Term
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
-SHIPS = tuple(1 << power for power in reversed(range(8)))
-"""Number of ships in one function."""
-DAMPING = 1e-12
-"""Of directions in which nothing pushes, in squares of the mean push."""
-LIMITED = 1e-12
-"""Share by which limits must change a command to count."""
+SHIPS = tuple(1 << power for power in reversed(range(8)))  # number of ships in one function
+DAMPING = 1e-12  # of directions in which nothing pushes, in squares of the mean push
+LIMITED = 1e-12  # share by which limits must change a command to count
 
 Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Inertia | None]
 """Terms, form, sample time, actuators and coupled inertia of a model: everything but the values of its parameters."""

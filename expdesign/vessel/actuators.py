@@ -35,8 +35,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 `depth` stands in no vessel file: it is how recorded depth reaches the terms that read it, beside the recorded inputs.
 """
 
-UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}
-"""Signal stem -> unit in column names; generalised forces have none."""
+UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}  # signal stem -> unit in column names; generalised forces have none
 
 SIGNALS = {
     "n": ("speed", "_rps", "_rps2"),
@@ -49,8 +48,7 @@ SIGNALS = {
 """Signal stem -> word for it, its unit and the unit of its rate, as in keys of vessel files."""
 
 
-RATE_UNITS = {name: unit.strip("_") for name, (_, _, unit) in SIGNALS.items()}
-"""Signal stem -> unit of its slew rate."""
+RATE_UNITS = {name: unit.strip("_") for name, (_, _, unit) in SIGNALS.items()}  # signal stem -> unit of its slew rate
 
 
 def limit_keys(stem: str) -> tuple[str, str]:
@@ -78,8 +76,7 @@ class Limit:
             raise InputError(f"limits are [{self.low:g}, {self.high:g}], expected low below high")
 
 
-IDEAL = Response()
-"""The command is delivered unchanged and at once."""
+IDEAL = Response()  # the command is delivered unchanged and at once
 
 
 @dataclass(frozen=True, kw_only=True)

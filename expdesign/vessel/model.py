@@ -96,14 +96,11 @@ NOT_SUPPORTED = (
     "without that table"
 )
 
-UNSTATED_SHARE = 0.1
-"""Standard deviation, as a share of the value, with which drawn ships differ where none is stated."""
+UNSTATED_SHARE = 0.1  # standard deviation, as a share of the value, with which drawn ships differ where none is stated
 FEWEST_DRAWN = 1000
 SHARE_DRAWN = 2500
-FAR_OUTSIDE = 3.0
-"""Standard deviations outside of its range from which on a parameter contradicts it."""
-LEAST_KEPT = 1e-3
-"""Share of drawn vessels within the stated range below which the range contradicts the prior."""
+FAR_OUTSIDE = 3.0  # standard deviations outside of its range from which on a parameter contradicts it
+LEAST_KEPT = 1e-3  # share of drawn vessels within the stated range below which the range contradicts the prior
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -342,12 +342,10 @@ class Sensors:
         return getattr(self, f"{sensor}_delay_s"), getattr(self, f"{sensor}_interval_s")
 
 
-EXACT = Sensors()
-"""Sensors without error."""
+EXACT = Sensors()  # sensors without error
 GAINS_AND_OFFSETS = tuple(row for row in rows_of(Sensors) if row.signals)
 """Of a velocity sensor, along its own axes, and of a gyro."""
-NOISE = tuple(row.key for row in rows_of(Sensors) if row.takes == STD)
-"""Standard deviations of sensors."""
+NOISE = tuple(row.key for row in rows_of(Sensors) if row.takes == STD)  # standard deviations of sensors
 
 
 # What no field of a vessel file states by itself.

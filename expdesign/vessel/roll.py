@@ -52,8 +52,7 @@ class Load:
             raise InputError(f"load.z_m is {self.z_m:g}, expected a finite place")
 
 
-NOMINAL = Load(mass_kg=0.0, z_m=0.0)
-"""No load besides the ship."""
+NOMINAL = Load(mass_kg=0.0, z_m=0.0)  # no load besides the ship
 
 
 @dataclass(frozen=True, kw_only=True)

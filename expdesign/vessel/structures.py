@@ -38,8 +38,7 @@ NUMPY = Operators(np.abs, np.sin, np.cos)
 SCALAR = Operators(abs, math.sin, math.cos)
 FUNCTIONS = ("abs", "sin", "cos")
 
-DEEPEST = 50
-"""Nested operations; a term of a ship model has a handful."""
+DEEPEST = 50  # nested operations; a term of a ship model has a handful
 
 Signals = Mapping[str, Any]
 Evaluate = Callable[[Signals, Operators], Any]
@@ -146,8 +145,7 @@ def _binary(operator: ast.operator, left: Evaluate, right: Evaluate) -> Evaluate
     return lambda signals, ops: left(signals, ops) * right(signals, ops)
 
 
-SHOAL = "h"
-"""Draught over water depth."""
+SHOAL = "h"  # draught over water depth
 MOTION_SIGNALS = ("u", "v", "r", "u_q", "v_q", SHOAL)
 FORCE_SIGNALS = ("tau_x", "tau_y", "tau_psi")
 

@@ -30,26 +30,17 @@ if TYPE_CHECKING:
 
 SECANTS = (0.05, 0.05, 0.02, 0.01, *([1e-3] * 8), *([1e-4] * 18))
 """Half widths of the secants of each iteration, as shares: wide ones see past thrust that vanishes."""
-NEAR_SECANTS = (0.02, 0.01, 1e-3, 1e-3)
-"""The same from commands a sample before."""
-EASED = 0.9
-"""Share of the commands a sample before that is kept where others give as much."""
+NEAR_SECANTS = (0.02, 0.01, 1e-3, 1e-3)  # the same from commands a sample before
+EASED = 0.9  # share of the commands a sample before that is kept where others give as much
 STARTS = (1.0, 2.0, 0.0)
 """Shares of the commands that would do at rest, from which the search begins anew where it has found no answer."""
-SHORTER = 0.3
-"""Share of a step that is tried where the whole step leaves more missing."""
-SOLVED = 1e-11
-"""Acceleration that may be missing, in those of full thrust."""
-COARSE = 1e-2
-"""Acceleration, in those of full thrust, from which on two iterations do."""
-CLEARLY = 0.3
-"""Share of what is missing near those commands that must be missing elsewhere for commands to jump there."""
-STILL = 1e-8
-"""Change of shares that makes no difference."""
-REST_WIDTH = 0.5
-"""Half width of secants at rest."""
-LEAST_PUSH = 1e-3
-"""Smallest push at rest in any direction, in the largest, with which a ship is pushed everywhere."""
+SHORTER = 0.3  # share of a step that is tried where the whole step leaves more missing
+SOLVED = 1e-11  # acceleration that may be missing, in those of full thrust
+COARSE = 1e-2  # acceleration, in those of full thrust, from which on two iterations do
+CLEARLY = 0.3  # share of what is missing near those commands that must be missing elsewhere for commands to jump there
+STILL = 1e-8  # change of shares that makes no difference
+REST_WIDTH = 0.5  # half width of secants at rest
+LEAST_PUSH = 1e-3  # smallest push at rest in any direction, in the largest, with which a ship is pushed everywhere
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -41,10 +41,8 @@ class Variation:
         return math.exp(-time_s / self.correlation_s) if self.correlation_s > 0 else 0.0
 
 
-STEADY = Variation()
-"""No variation."""
-SEA_STATES = range(10)
-"""Codes of the World Meteorological Organization, table 3700."""
+STEADY = Variation()  # no variation
+SEA_STATES = range(10)  # codes of the World Meteorological Organization, table 3700
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

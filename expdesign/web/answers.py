@@ -33,12 +33,9 @@ from expdesign.values import Array
 
 Answer = dict[str, Any]
 
-DEGREE_DECIMALS = 7
-"""About a centimetre."""
-MOST_PLAYED = 40_000
-"""Samples of a track that are sent at most; more are thinned."""
-TRACK_POINTS = 120
-"""Points of a manoeuvre's sketch."""
+DEGREE_DECIMALS = 7  # about a centimetre
+MOST_PLAYED = 40_000  # samples of a track that are sent at most; more are thinned
+TRACK_POINTS = 120  # points of a manoeuvre's sketch
 
 
 def chart_of(area_file: str, draught_m: float) -> Answer:

@@ -19,16 +19,11 @@ import tomlkit
 
 from expdesign.errors import FileError, InputError
 
-VERSIONS = ".expdesign"
-"""Folder of earlier versions."""
-MOST_VERSIONS = 100
-"""Kept of each file."""
-MOST_UPLOAD_BYTES = 200 * 2**20
-"""Size of a file that is taken in."""
-MOST_FILES = 5000
-"""Looked through for files of a kind."""
-NAME = re.compile(r"[A-Za-z0-9][\w. -]{0,80}")
-"""Names of files that are taken in."""
+VERSIONS = ".expdesign"  # folder of earlier versions
+MOST_VERSIONS = 100  # kept of each file
+MOST_UPLOAD_BYTES = 200 * 2**20  # size of a file that is taken in
+MOST_FILES = 5000  # looked through for files of a kind
+NAME = re.compile(r"[A-Za-z0-9][\w. -]{0,80}")  # names of files that are taken in
 KINDS = {
     "scenario": ("scenario", "design"),
     "vessel": ("vessel", "model"),

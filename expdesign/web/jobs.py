@@ -16,12 +16,9 @@ from pathlib import Path
 
 from expdesign.requests import Request, command_text
 
-PROGRESS = re.compile(r"\[\s*(\d+)%\] (.*)")
-"""A line of progress: share and activity."""
-MOST_LINES = 2000
-"""Kept of an output."""
-MOST_JOBS = 2
-"""At work at once; later ones wait."""
+PROGRESS = re.compile(r"\[\s*(\d+)%\] (.*)")  # a line of progress: share and activity
+MOST_LINES = 2000  # kept of an output
+MOST_JOBS = 2  # at work at once; later ones wait
 INTERRUPTED = 130
 
 

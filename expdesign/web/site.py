@@ -33,10 +33,8 @@ PAGES = (
 """Address and name of each page, in the order of the work."""
 PRIMARY, NEGATIVE = "#0b5a8a", "#a3261c"
 """Colours of buttons and of errors, dark enough for white text."""
-LOOK_S = 2.0
-"""Time between two looks at the files that a page shows."""
-REFRESH_S = 0.5
-"""Time between two looks at a command that runs."""
+LOOK_S = 2.0  # time between two looks at the files that a page shows
+REFRESH_S = 0.5  # time between two looks at a command that runs
 
 
 @dataclass

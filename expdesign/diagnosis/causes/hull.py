@@ -17,8 +17,7 @@ from expdesign.diagnosis.model import (
 
 CHANGE_POINTS = 12
 FINER = 6
-EDGE = 0.06
-"""Share of a run at either end in which no change is tested."""
+EDGE = 0.06  # share of a run at either end in which no change is tested
 
 
 def _candidates_change_point(situation: Situation) -> tuple[Candidate, ...]:

@@ -141,5 +141,4 @@ SENSOR_DELAY = Cause(
 )
 
 
-SENSOR_CAUSES = (HEADING_BIAS, LEVER_ARM, SENSOR_DELAY, *OF_ROWS)
-"""Faults of the record rather than of the model."""
+SENSOR_CAUSES = (HEADING_BIAS, LEVER_ARM, SENSOR_DELAY, *OF_ROWS)  # faults of the record rather than of the model

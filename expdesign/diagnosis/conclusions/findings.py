@@ -122,8 +122,7 @@ def error_reductions_of(
     return tuple(ErrorReduction(output=name, share=share, low=low, high=high) for name, share, low, high in rows)
 
 
-FEW = 0.002
-"""Share of missing samples that needs no note."""
+FEW = 0.002  # share of missing samples that needs no note
 
 
 def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Sequence[str]) -> tuple[str, ...]:

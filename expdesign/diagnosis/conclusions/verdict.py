@@ -19,8 +19,7 @@ from expdesign.diagnosis.fit import AHEAD_S, validation_units
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
 from expdesign.values import Array
 
-DIVERGED_FIT = -300.0
-"""Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
+DIVERGED_FIT = -300.0  # fit [%] below which the simulation has diverged from the ship; the number then has no meaning
 MISSING_EFFECTS = {cause.name: cause.missing for cause in CAUSES if cause.missing}
 """Cause -> missing effect of the simulation."""
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
@@ -38,12 +37,9 @@ MANOEUVRES = {
 """Standard proposals in words; those of a scenario's dictionary keep their names."""
 
 
-LITTLE_FIT = 50.0
-"""Fit [%] of an output below which data are not called free of error, whatever noise there is."""
-MOST_SIZES = 2
-"""Numbers of a cause in a sentence; the table has all."""
-MOST_NAMED = 3
-"""Parameters, or equivalent causes, in a sentence."""
+LITTLE_FIT = 50.0  # fit [%] of an output below which data are not called free of error, whatever noise there is
+MOST_SIZES = 2  # numbers of a cause in a sentence; the table has all
+MOST_NAMED = 3  # parameters, or equivalent causes, in a sentence
 SENSORS = tuple(cause.name for cause in SENSOR_CAUSES)
 WEATHER = ("current", "wind")
 

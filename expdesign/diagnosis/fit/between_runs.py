@@ -20,8 +20,7 @@ from expdesign.diagnosis.fit.linear_model import window_information
 from expdesign.estimation.solve import MOST_FREEDOM, Dispersion, Spread, few_runs_factor, spread_between_runs
 from expdesign.values import Array
 
-NOISE_ALONE = Dispersion()
-"""Runs that do not differ."""
+NOISE_ALONE = Dispersion()  # runs that do not differ
 
 
 def tail(statistic: float, numbers: int, factor: float = 1.0, freedom: float = math.inf) -> float:

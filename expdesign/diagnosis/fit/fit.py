@@ -35,12 +35,9 @@ FORCE_SPACING_S = 60.0  # between the knots of a force that nobody measured [s]
 FORCE_PENALTIES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
 
 
-POSITIVE = tuple(f"{kind}:" for kind in FOLLOWING)
-"""Effects that are times, from zero on."""
-LEAST_PIVOT = 1e-6
-"""Of a matrix with a unit diagonal that counts as regular: the size of a direction beside all others."""
-LITTLE = 1e-6
-"""Share of a step from which slopes of factors are taken."""
+POSITIVE = tuple(f"{kind}:" for kind in FOLLOWING)  # effects that are times, from zero on
+LEAST_PIVOT = 1e-6  # of a matrix with a unit diagonal that counts as regular: the size of a direction beside all others
+LITTLE = 1e-6  # share of a step from which slopes of factors are taken
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

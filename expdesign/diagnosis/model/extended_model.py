@@ -38,8 +38,7 @@ ROLL = {"roll:period": "period_s", "roll:damping": "damping_ratio", "roll:sway":
 LEAST_HEIGHT = 0.01
 """Metacentric height over beam of a ship that is hardly stable; a ship of 9 m has the 0.15 m that the code asks for at
 0.017."""
-SLIGHTLY = 1e-6
-"""Distance from a bound that is rounding."""
+SLIGHTLY = 1e-6  # distance from a bound that is rounding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,12 +18,9 @@ from expdesign.vessel.quantities import rows_of
 from expdesign.vessel.structures import FORCE_SIGNALS, FUNCTIONS, MOTION_SIGNALS, Expression, parse_expression
 
 Effects = Mapping[str, float]
-AIR_SIGNALS = frozenset({"u_q", "v_q"})
-"""Velocity through the air."""
-LINEAR = 2.0 + 1e-9
-"""Growth of a linear term from one speed to its double."""
-MOST_SUMS = 12
-"""In a regressor that is written as a sum of products; those of ship models have a few."""
+AIR_SIGNALS = frozenset({"u_q", "v_q"})  # velocity through the air
+LINEAR = 2.0 + 1e-9  # growth of a linear term from one speed to its double
+MOST_SUMS = 12  # in a regressor that is written as a sum of products; those of ship models have a few
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -305,10 +302,8 @@ MORE_TERMS = (
 
 Source: M. A. Abkowitz, Lectures on ship hydrodynamics (1964), for the cubic terms.
 """
-ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")
-"""Terms of the thrust loss with advance speed."""
-AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
-"""Library terms of the air."""
+ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")  # terms of the thrust loss with advance speed
+AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")  # library terms of the air
 
 
 def term_library(model: VesselModel) -> Mapping[str, Term]:
@@ -391,10 +386,8 @@ RESPONSES = {row.effects[0]: row.key for row in rows_of(Response)}
 
 The effect of a slew rate is its inverse, the time that a change of one unit takes, so that zero changes nothing.
 """
-FOLLOWING = ("slew", "lag", "delay", "lead")
-"""Kinds of effects of a group of inputs that are times, from zero on."""
-LEAST_EFFECT = 1e-6
-"""Size of such an effect that is taken for zero: derivatives by times are differences upward."""
+FOLLOWING = ("slew", "lag", "delay", "lead")  # kinds of effects of a group of inputs that are times, from zero on
+LEAST_EFFECT = 1e-6  # size of such an effect that is taken for zero: derivatives by times are differences upward
 
 
 def response_effect(kind: str, value: float) -> float:

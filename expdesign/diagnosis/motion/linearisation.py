@@ -209,8 +209,7 @@ def _shifted(values: Array, samples: float) -> Array:
 # The response to a disturbance is that of the linearised motion to its change of acceleration along the simulated path.
 # All disturbances share one linearisation, so hundreds of them cost little more than one simulation.
 
-TURNS = "heading_bias"
-"""The effect of a sensor that also turns current and wind, where the heading is the compass's."""
+TURNS = "heading_bias"  # the effect of a sensor that also turns current and wind, where the heading is the compass's
 
 
 def linearise(motion: Motion) -> LinearisedMotion:

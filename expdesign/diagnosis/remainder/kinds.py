@@ -20,12 +20,9 @@ from expdesign.values import Array
 from expdesign.vessel import stem
 
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
-LAG_S, MORE_LAG_S = 4.0, 1.0
-"""Of an actuator without a lag, and beyond one that it has."""
-TIMES = 9
-"""Number of times at which an effect may begin, evenly over the data."""
-SATURATED = (0.5, 0.75)
-"""Quantiles of an input at which it may saturate."""
+LAG_S, MORE_LAG_S = 4.0, 1.0  # of an actuator without a lag, and beyond one that it has
+TIMES = 9  # number of times at which an effect may begin, evenly over the data
+SATURATED = (0.5, 0.75)  # quantiles of an input at which it may saturate
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -250,8 +250,7 @@ def _name(term: Term, taken: set[str]) -> str:
 
 
 PARAMETERS = "parameters"
-UNLISTED = "unlisted_term"
-"""Kind of such causes; the rest of their name says what they look like."""
+UNLISTED = "unlisted_term"  # kind of such causes; the rest of their name says what they look like
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -149,8 +149,7 @@ ASIDE = (
     "u*u*v", "u*u*r", "u*v*abs(v)", "u*r*abs(r)",
 )  # fmt: skip
 """Products of motion that keep their sign when port and starboard are exchanged, and those that change it."""
-FACTORS = ("u", "abs(v)", "abs(r)", "u*u", "v*v", "r*r")
-"""What may change the effect of an input."""
+FACTORS = ("u", "abs(v)", "abs(r)", "u*u", "v*v", "r*r")  # what may change the effect of an input
 SAME = 1e-9
 
 

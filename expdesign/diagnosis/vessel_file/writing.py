@@ -108,8 +108,7 @@ def _taken_apart(expression: str) -> tuple[str, Polynomial]:
 
 TURN = re.compile(r"\btau_psi\b")
 FORCES = {"u": "X", "v": "Y", "r": "N"}
-VISIBLE = 1e-4
-"""Relative error of a written dependence on depth above which a note states it."""
+VISIBLE = 1e-4  # relative error of a written dependence on depth above which a note states it
 
 
 @dataclass(frozen=True, kw_only=True)

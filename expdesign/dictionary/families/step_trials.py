@@ -70,10 +70,8 @@ HELM_AND_ENGINE_WAVES = Family(
 
 # How long a level must be held: until drawn vessels are steady, and then for a circle.
 
-SETTLED = 4.0
-"""Time constants until a vessel counts as steady: 2 % of the step are left."""
-DRAWN = 400
-"""Vessels of the prior; the share that a level is long enough for is met to 2 %."""
+SETTLED = 4.0  # time constants until a vessel counts as steady: 2 % of the step are left
+DRAWN = 400  # vessels of the prior; the share that a level is long enough for is met to 2 %
 NUDGE = 1e-4
 
 HOLD_SETTINGS = (
@@ -158,8 +156,7 @@ def _linearised(vessel: Vessel, drawn: Array, motion: Array, inputs: Array) -> t
 # Levels of engine order and helm that are gone through up and down, each for as long as it takes.
 
 STEADY_MPS2 = 1e-6
-PARTS = 4
-"""Steps of helm from the straight course to a steady turn."""
+PARTS = 4  # steps of helm from the straight course to a steady turn
 
 STAIR_DURATION = Setting(
     name="duration_s",
@@ -283,8 +280,7 @@ def turn_near(approach: Approach, helm_rad: float, near: Array) -> Array:
     return motion
 
 
-TRIED = 13
-"""Helm angles whose steady turns are computed."""
+TRIED = 13  # helm angles whose steady turns are computed
 
 
 def _orders_rudder_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:

@@ -110,8 +110,7 @@ def timeline(batch: Integers, step: Integers) -> Timeline:
 #
 # The formula and its sources stand in `components`.
 
-WHITE, SENSOR = 0, 1
-"""Places of the quick parts among the variances; slow ones follow."""
+WHITE, SENSOR = 0, 1  # places of the quick parts among the variances; slow ones follow
 MEMORIES = 2.0 ** np.arange(1, 11)
 """Memories of slow parts [samples], at most the longest stretch; one more part lasts for ever."""
 

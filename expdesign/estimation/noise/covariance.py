@@ -226,8 +226,7 @@ def as_correlation(found: Array) -> Array:
 # Source: prewhitening after D. W. K. Andrews and J. C. Monahan, Econometrica 60 (1992), 953-966, here of the residuals
 # and exact; noise in one-step predictors: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.66).
 
-MOVING_AVERAGES = np.tanh(np.linspace(-2.3, 2.3, 18))
-"""Values tried for c, from -0.98 to 0.98; they need not be exact."""
+MOVING_AVERAGES = np.tanh(np.linspace(-2.3, 2.3, 18))  # values tried for c, from -0.98 to 0.98; they need not be exact
 
 
 @dataclass(frozen=True)

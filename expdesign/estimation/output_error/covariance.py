@@ -43,8 +43,7 @@ from expdesign.estimation.solve import (
 from expdesign.signals import Record
 from expdesign.values import Array
 
-EVERY = -1
-"""Key that stands for all outputs."""
+EVERY = -1  # key that stands for all outputs
 
 
 def with_covariance(

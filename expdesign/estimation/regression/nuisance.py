@@ -196,8 +196,7 @@ def headings(psi: Any) -> dict[str, Any]:
 # Source: Gauss's and Newton's linearisation of the model of T. I. Fossen, Handbook of Marine Craft Hydrodynamics and
 # Motion Control (2011), 8.3; the predictor of F. Ljungberg, doctoral thesis, Linköping University, (5.63), with it.
 
-STEADY_CURRENT = ("current to north", "current to east")
-"""Names of the nuisance parameters [m/s]."""
+STEADY_CURRENT = ("current to north", "current to east")  # names of the nuisance parameters [m/s]
 STEP_MPS = 1e-4
 """Step of the central difference, which is exact for terms of second order away from a change of sign of a modulus."""
 

@@ -18,8 +18,7 @@ from expdesign.vessel import NUMPY, Operators
 
 SignalTable = Mapping[str, Any]
 Monomial = tuple[str, ...]
-MOVING = ("u", "v")
-"""Signals that a current or a wind shifts."""
+MOVING = ("u", "v")  # signals that a current or a wind shifts
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,8 +59,7 @@ from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import MOTION_SIGNALS
 
 NOTHING, CURRENT, WIND, BOTH, STEADY = "nothing", "current", "wind", "both", "steady-current"
-UNKNOWN = (NOTHING, CURRENT, WIND, BOTH, STEADY)
-"""What may be unknown of the weather and is estimated beside the ship."""
+UNKNOWN = (NOTHING, CURRENT, WIND, BOTH, STEADY)  # what may be unknown of the weather and is estimated beside the ship
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,8 @@ from expdesign.estimation.regression import Integers, batch_slices
 from expdesign.values import Array
 
 DIFFERING_LEVEL = 0.01  # of Cochran's test, from which runs differ
-FEWEST, MOST_FREEDOM = 0.3, 1e5
-"""Degrees of freedom from which a spread tells anything, and which count as any number."""
-LEAST_SHARE = 1e-9
-"""Of the information, for a run to tell anything."""
+FEWEST, MOST_FREEDOM = 0.3, 1e5  # degrees of freedom from which a spread tells anything, and which count as any number
+LEAST_SHARE = 1e-9  # of the information, for a run to tell anything
 NORMAL_95 = NormalDist().inv_cdf(0.975)
 
 

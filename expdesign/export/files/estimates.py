@@ -139,8 +139,7 @@ def _fits(run: RunCheck) -> str:
     return " ".join("-" if math.isnan(value) else f"{value:.1f}" for value in run.fit_percent.tolist())
 
 
-COMMENT_WIDTH = 110
-"""Characters of a line of comments."""
+COMMENT_WIDTH = 110  # characters of a line of comments
 
 
 def estimate_json(found: Assessment, vessel: Vessel) -> str:

@@ -61,8 +61,7 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-GAP_SAMPLES = 10
-"""Gap between the times of two batches, in samples."""
+GAP_SAMPLES = 10  # gap between the times of two batches, in samples
 
 
 def record_csv(batches: Sequence[Batch]) -> str:

@@ -19,8 +19,7 @@ FORMATS: tuple[Format, ...] = (
     missions.PLAN,
     missions.WAYPOINTS,
 )
-STANDARD = ("rtz", "gpx", "kml", "geojson", "qgc", "ardupilot", "csv")
-"""Formats that every plan is written in."""
+STANDARD = ("rtz", "gpx", "kml", "geojson", "qgc", "ardupilot", "csv")  # formats that every plan is written in
 
 
 def find_format(name: str) -> Format:

@@ -20,8 +20,7 @@ from expdesign.export.formats.format import Format, degrees, route_file
 from expdesign.export.routes import Route
 
 NAV_WAYPOINT, DO_CHANGE_SPEED = 16, 178
-GLOBAL, MISSION, GLOBAL_RELATIVE_ALT = 0, 2, 3
-"""Frames of a mission item."""
+GLOBAL, MISSION, GLOBAL_RELATIVE_ALT = 0, 2, 3  # frames of a mission item
 GROUND_SPEED = 1.0
 THROTTLE_UNCHANGED = -1.0
 SLOWEST_MPS = 0.01

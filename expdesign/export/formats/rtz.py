@@ -21,8 +21,7 @@ from expdesign.export.routes import Route, Waypoint
 
 SPACE = "http://www.cirm.org/RTZ/{}/{}"
 VERSIONS = ("1.0", "1.1", "1.2")
-LARGEST_FILE = 400_000
-"""Bytes that an ECDIS must accept."""
+LARGEST_FILE = 400_000  # bytes that an ECDIS must accept
 DAY_S = 86400.0
 
 

@@ -12,11 +12,9 @@ from expdesign.export.document import Block, Document, Figure, Gallery, Table, f
 from expdesign.export.formats.format import xml_text
 from expdesign.progress import Progress, in_phases, silent
 
-MANY_SECTIONS = 7
-"""From which a page has links to them."""
+MANY_SECTIONS = 7  # from which a page has links to them
 DRAWING = "drawing the page"
-DRAWING_LOADS = 3.0
-"""How many figures could be drawn while the library for them loads, for the progress told."""
+DRAWING_LOADS = 3.0  # how many figures could be drawn while the library for them loads, for the progress told
 
 
 def page_template(name: str, *, package: str = __name__) -> Template:

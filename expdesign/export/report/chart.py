@@ -162,8 +162,7 @@ def _covered(pose: Array, radius: Array, hull_b: Array) -> shapely.Geometry:
     return shapely.union_all(spans)
 
 
-WIDTH_IN, LABELS_IN = 6.4, 0.9
-"""Of a chart, and of it for the labels of latitudes."""
+WIDTH_IN, LABELS_IN = 6.4, 0.9  # of a chart, and of it for the labels of latitudes
 KINDS = {"reposition": (REPOSITION, 1.3), "primitive": (PRIMITIVE, 2.4)}
 SHALLOW, DEEP, SAFETY = "#a9cfe8", "#ffffff", "#3f4a55"
 """Water within the safety contour, water deep enough for trials in deep water, and the contour itself."""

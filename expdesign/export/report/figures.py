@@ -284,8 +284,7 @@ LEAST_SPAN = {"u [m/s]": 0.2, "v [m/s]": 0.2, "r [\N{DEGREE SIGN}/s]": 0.2}
 
 
 SIZE_IN = (5.2, 3.3)
-PATH_BOX = (0.125, 0.15, 0.335, 0.82)
-"""Place of the path's axes: left, bottom, width, height, as shares of the figure."""
+PATH_BOX = (0.125, 0.15, 0.335, 0.82)  # place of the path's axes: left, bottom, width, height, as shares of the figure
 CURVE_BOXES = tuple((0.655, bottom, 0.33, 0.235) for bottom in (0.735, 0.4425, 0.15))
 
 

@@ -15,8 +15,7 @@ from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array
 
 REST_MPS, REST_RADPS, AT_REST = 0.02, 0.0005, "at rest"
-NEARLY_ZERO = 1e-9
-"""In SI; smaller settings are rounding errors."""
+NEARLY_ZERO = 1e-9  # in SI; smaller settings are rounding errors
 
 
 @dataclass(frozen=True, kw_only=True)

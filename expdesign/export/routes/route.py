@@ -164,8 +164,7 @@ def _unwrapped(places_deg: Array) -> Array:
     return np.asarray(places_deg - np.array([[0.0, 0.0], [0.0, jump]]))
 
 
-ROUTE_NAME = "route"
-"""Stem of the file names; ECDIS expect it as the name inside the file too."""
+ROUTE_NAME = "route"  # stem of the file names; ECDIS expect it as the name inside the file too
 DEGREE_DECIMALS = 7
 """Resolution of all files, 11 mm, as autopilots store it. Routes are checked after rounding to it."""
 XTD_STEP_M = METRES_PER_NAUTICAL_MILE / 10_000

@@ -33,8 +33,7 @@ from expdesign.importing.mapping import counted
 from expdesign.importing.times import over_midnight, read_stamps
 from expdesign.values import Array
 
-PREFIX = re.compile(r"(\d{12,14});[^;]*;")
-"""Milliseconds since 1970 and the provider, in the log of a server."""
+PREFIX = re.compile(r"(\d{12,14});[^;]*;")  # milliseconds since 1970 and the provider, in the log of a server
 UNITS = (
     (r"position\.(latitude|longitude)$", "deg"), (r"(speed\w*|velocity\w*)$", "mps"), (r"rateOfTurn$", "radps"),
     (r"revolutions$", "rps"), (r"(heading|course|bearing|angle|direction|variation)\w*$|rudderAngle|attitude", "rad"),
@@ -184,8 +183,7 @@ MESSAGES: dict[int, tuple[str, dict[str, tuple[str, str]]]] = {
 """Number of a message -> its name here, and field -> name and unit of a channel."""
 NEEDED = {129026: ("cogreference", "True"), 130306: ("reference", "Apparent")}
 """Message -> field and text that it must have to be used."""
-DEGREES = {"rad": "deg", "radps": "degps"}
-"""Units in JSON of canboat that is not of strict SI."""
+DEGREES = {"rad": "deg", "radps": "degps"}  # units in JSON of canboat that is not of strict SI
 FORMS = {
     "plain": re.compile(r"(\d{4}-\d\d-\d\d)[T-](\d\d:\d\d:\d\d\.?\d*)Z?,\d+,\d+,\d+,\d+,(\d+),"),
     "candump": re.compile(r"\((\d+\.\d+)\)\s+\S+\s+[0-9A-Fa-f]{8}#"),

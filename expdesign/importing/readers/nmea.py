@@ -71,14 +71,12 @@ OWN_SHIP = {"lat": ("lat", "deg", 91.0), "lon": ("lon", "deg", 181.0), "spd": ("
 """Reading -> field of pyais, unit, and what stands for none (ITU-R M.1371)."""
 WGS84 = ("", "W84", "P90", "999")
 PLACES = {name: {field: place for place, field in enumerate(NMEA_PAYLOADS_GET[name])} for name in FIELDS}
-INVALID = {"V", "0", "N", "NN", "NNN", "NNNN"}
-"""Marks of a reading that is not valid."""
+INVALID = {"V", "0", "N", "NN", "NNN", "NNNN"}  # marks of a reading that is not valid
 TIMED = ("RMC", "GGA", "GNS", "GLL", "ZDA")
 WIND_UNITS = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}
 XDR_UNITS = {"D": "deg", "M": "m", "N": "", "P": "percent"}
 ENDS = '"\r\n \x00'
-TWO_DIGITS = {form.format(number): number for number in range(256) for form in ("{:02X}", "{:02x}")}
-"""Of a checksum."""
+TWO_DIGITS = {form.format(number): number for number in range(256) for form in ("{:02X}", "{:02x}")}  # of a checksum
 SENTENCE = re.compile(r"[$!]([A-Z]{2,4}[A-Z]{3}|P[A-Z0-9]+),")
 DATE_AND_TIME = re.compile(
     r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})[T ,;:_\t]+"

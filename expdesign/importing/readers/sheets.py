@@ -21,8 +21,7 @@ from expdesign.importing.mapping import split_unit
 from expdesign.importing.readers.text import read_text
 from expdesign.importing.times import TIME_NAME, Clock, clock_of, read_stamps
 
-MOST_COLUMNS = 64
-"""Columns of one array beyond which it is an image or a map."""
+MOST_COLUMNS = 64  # columns of one array beyond which it is an image or a map
 
 
 def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: float) -> Log:

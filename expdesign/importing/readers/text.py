@@ -38,8 +38,7 @@ from expdesign.values import Array
 TEXTS_SHOWN = 3
 STAMPS = ("both", "date", "clock")
 LATITUDE, LONGITUDE = r"\b(lat|latitude)\b", r"\b(lon|lng|long|longitude)\b"
-TURNED = r"\b(variation|deviation|declination|mv)\b"
-"""Names of angles with E or W that are no places."""
+TURNED = r"\b(variation|deviation|declination|mv)\b"  # names of angles with E or W that are no places
 VESSEL = r"\b(mmsi|imo|call ?sign|vessel name|ship name|boat name)\b"
 """Names of columns that say which vessel a row is of."""
 AMBIGUOUS = re.compile(r"(0?\d|1[0-2])[-/](0?\d|1[0-2])[-/](\d{4}|\d\d)")

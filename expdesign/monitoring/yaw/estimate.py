@@ -182,10 +182,8 @@ def halves_differ(one: YawEstimate, other: YawEstimate, *, factor: float = 3.0) 
     return np.asarray(~((ratio > 1.0 / factor) & (ratio < factor)))
 
 
-INTERVAL_S = 5.0
-"""Over which the equation is integrated [s]."""
-LEAST_SHARE = 1e-3
-"""Of the moment, that a parameter of the wrong sign gives at first."""
+INTERVAL_S = 5.0  # over which the equation is integrated [s]
+LEAST_SHARE = 1e-3  # of the moment, that a parameter of the wrong sign gives at first
 
 
 def start_values(model: YawModel, data: YawData) -> dict[str, float]:

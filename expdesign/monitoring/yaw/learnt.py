@@ -40,16 +40,11 @@ from expdesign.vessel import VesselModel
 # 1627-1639.
 
 STEPS = 15
-LARGEST_STEP = 0.5
-"""Of a parameter in a step, as a share of its start."""
-SMALLEST_STEP = 1e-4
-"""Below which there is no further one, as a share of the start."""
-SETTLED = 0.02
-"""Largest last step, in standard errors."""
-SMOOTHING_S = 2.0
-"""Of each half, so that products of noisy signals have little noise inside their absolute values [s]."""
-BLOCK_S = 20.0
-"""Over which errors may hang together [s]."""
+LARGEST_STEP = 0.5  # of a parameter in a step, as a share of its start
+SMALLEST_STEP = 1e-4  # below which there is no further one, as a share of the start
+SETTLED = 0.02  # largest last step, in standard errors
+SMOOTHING_S = 2.0  # of each half, so that products of noisy signals have little noise inside their absolute values [s]
+BLOCK_S = 20.0  # over which errors may hang together [s]
 
 
 def split(data: YawData, *, smoothing_s: float = SMOOTHING_S) -> tuple[YawData, YawData]:
@@ -135,13 +130,10 @@ def estimate_yaw_by_instruments(
     )
 
 
-STRETCHES = 2
-"""In a part that is simulated in one go."""
+STRETCHES = 2  # in a part that is simulated in one go
 FEWEST_PARTS = 4
-EQUAL_FIT = 5.0
-"""Halves are fitted alike within so much [%]."""
-MAIN = 0.3
-"""Weight from which a parameter is named in a direction."""
+EQUAL_FIT = 5.0  # halves are fitted alike within so much [%]
+MAIN = 0.3  # weight from which a parameter is named in a direction
 
 
 def learnt_ship(

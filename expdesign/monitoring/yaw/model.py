@@ -109,8 +109,7 @@ def term_budget(model: YawModel, data: YawData, parameters: Mapping[str, float])
 
 MOMENT = "actuator_psi_nm"
 SIDE = ("sway_acceleration_mps2", "lateral_acceleration_mps2")
-SAMPLES = 250
-"""Of a stretch, at most; more are averaged."""
+SAMPLES = 250  # of a stretch, at most; more are averaged
 
 
 def needed_columns(model: YawModel) -> tuple[str, ...]:

@@ -85,10 +85,8 @@ class ForceController:
         return Allocator(self.vessel.model, sample_time_s=self.vessel.sample_time_s)
 
 
-ORDERS = np.linspace(-1.0, 1.0, 9)
-"""Engine orders compared."""
-KICKS = np.linspace(0.0, 1.0, 9)
-"""Engine orders ahead compared where the helm needs thrust."""
+ORDERS = np.linspace(-1.0, 1.0, 9)  # engine orders compared
+KICKS = np.linspace(0.0, 1.0, 9)  # engine orders ahead compared where the helm needs thrust
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

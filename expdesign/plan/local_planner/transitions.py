@@ -50,13 +50,10 @@ OPEN_WATER_HULLS = 25.0  # of open water to every side of a transition that is t
 
 LENGTHS = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 2.7, 3.5, 5.0])
 """Lengths of transitions between runs, in hull lengths."""
-GOING_ON = np.array([1.0, 1.1, 1.25])
-"""More of them, in how far the ship goes while it settles."""
-TURNS = np.arange(16) * np.pi / 8
-"""Turns in them, and courses from the heading before."""
+GOING_ON = np.array([1.0, 1.1, 1.25])  # more of them, in how far the ship goes while it settles
+TURNS = np.arange(16) * np.pi / 8  # turns in them, and courses from the heading before
 COURSES = np.arange(24) * np.pi / 12
-DIRECTIONS = np.arange(12) * np.pi / 6
-"""Directions to go, from the heading before."""
+DIRECTIONS = np.arange(12) * np.pi / 6  # directions to go, from the heading before
 
 
 @dataclass(frozen=True, kw_only=True)

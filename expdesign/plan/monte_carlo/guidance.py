@@ -49,8 +49,7 @@ STANDSTILL_SHARE = 0.5
 SIDEWAYS_SHARE = 0.5  # of an azimuth's thrust ahead or astern, below which it counts as to the side
 
 
-STRAIGHT = 2
-"""Points of a path without bends."""
+STRAIGHT = 2  # points of a path without bends
 TRACKING, RETURNING, BEGUN, ABORTED, OUT = range(5)
 """What a ship does: tracks a reference, follows a return path, has begun the run, has aborted, takes no part."""
 

@@ -28,11 +28,9 @@ from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 Counters = tuple[int, ...]
-NARROW = 1
-"""Layers kept per number of runs in the search that comes before the full one."""
+NARROW = 1  # layers kept per number of runs in the search that comes before the full one
 NO_PATH = "the lattice holds no path from start to goal that has room for every run"
-TINY = 1e-9
-"""Share of a cost that is rounding."""
+TINY = 1e-9  # share of a cost that is rounding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

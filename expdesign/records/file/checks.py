@@ -157,8 +157,7 @@ def _short_notes(table: Table, stretches: list[slice]) -> list[str]:
 ROUNDING = 1e-3
 TURN = 2.0 * np.pi
 FULL_CIRCLE_DEG = 360.0
-DECIMALS = 2
-"""Most decimals of angles that may be degrees."""
+DECIMALS = 2  # most decimals of angles that may be degrees
 LARGE_STEP, LARGE_SHARE = 1.0, 0.2
 """A change from row to row [rad], and the share of rows with more from which angles are taken for degrees."""
 COURSES, AHEAD_SHARE = 200, 0.5

@@ -14,10 +14,8 @@ from expdesign.signals import AUXILIARY
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
 STEERED, PLANNED, REACHED = "steered", "planned_", "reached_"
-PLAIN = ("batch", STEERED, *FORCES)
-"""Names without a unit."""
-LABEL = "manoeuvre"
-"""A column of texts, which only `records.labels` reads."""
+PLAIN = ("batch", STEERED, *FORCES)  # names without a unit
+LABEL = "manoeuvre"  # a column of texts, which only `records.labels` reads
 
 DEGREE = math.pi / 180.0
 SPEED = {
@@ -227,11 +225,9 @@ PAIRS = (
     ("wind_u_mps", "wind_v_mps"),
     ("wind_speed_mps", "wind_angle_rad"),
 )
-INSTEAD = (("lat_deg", "north_m"), ("lon_deg", "north_m"))
-"""A column that is not used when the other one is there."""
+INSTEAD = (("lat_deg", "north_m"), ("lon_deg", "north_m"))  # a column that is not used when the other one is there
 
-MOST_NAMED = 8
-"""Unknown columns, in a message."""
+MOST_NAMED = 8  # unknown columns, in a message
 
 Sources = dict[str, Source]
 

@@ -161,8 +161,7 @@ def turned_to_b(rates: Array, heading_rad: Array) -> Array:
 MEASURED, DIFFERENCE, SMOOTHED = "measured", "difference", "smoothed"
 COLUMN_OF = dict(zip(OUTPUTS, VELOCITY_COLUMNS, strict=True))
 NEEDS = {"u": POSE_COLUMNS, "v": POSE_COLUMNS, "r": POSE_COLUMNS[2:]}
-SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: SHORTEST_SMOOTHED}
-"""Samples that a batch must have."""
+SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: SHORTEST_SMOOTHED}  # samples that a batch must have
 DERIVED = "north_m and east_m (or lat_deg and lon_deg) with heading_rad (or heading_deg)"
 WORDS = {DIFFERENCE: "central differences of the pose", SMOOTHED: "the smoothed pose"}
 

@@ -88,8 +88,7 @@ KIND_KEYS = (
     *("typ", "laji", "tyyppi", "kohdeluokka", "soort", "objectsoort", *SEAMARK_KEYS),
 )
 """Properties that may say what a feature is, in the languages of the words."""
-CLASS_OF_KEY = {"catwrk": "WRECKS", "catobs": "OBSTRN", "valsou": "OBSTRN"}
-"""Attributes that only dangers have."""
+CLASS_OF_KEY = {"catwrk": "WRECKS", "catobs": "OBSTRN", "valsou": "OBSTRN"}  # attributes that only dangers have
 NUMBERS = {86: "OBSTRN", 129: "SOUNDG", 153: "UWTROC", 154: UNSURVEYED, 159: "WRECKS"}
 """Numbers of object classes, attribute OBJL."""
 DEPTH_KEYS = (

@@ -40,8 +40,7 @@ from expdesign.scenario.charts.zones import (
 from expdesign.scenario.tables import LARGEST, Entry, offer, shown
 from expdesign.sea_area import LocalFrame
 
-ROUNDING = 1e-9
-"""Share of an area that is rounding."""
+ROUNDING = 1e-9  # share of an area that is rounding
 
 
 def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry: Entry) -> OpenChart:

@@ -44,8 +44,7 @@ from expdesign.scenario.tables import Entry
 from expdesign.sea_area import LocalFrame
 
 OPTIONS = {"UPDATES": "APPLY", "SPLIT_MULTIPOINT": "YES", "ADD_SOUNDG_DEPTH": "YES"}
-DEPTHS = ("DEPARE", "DRGARE")
-"""Areas with a least depth DRVAL1: natural and dredged."""
+DEPTHS = ("DEPARE", "DRGARE")  # areas with a least depth DRVAL1: natural and dredged
 KEEP_OUT = {"7": "entry prohibited", "8": "entry restricted", "14": "area to be avoided"}
 """Values of the attribute RESTRN that keep a trial out."""
 WGS84, METRES = 2, 1

@@ -44,8 +44,7 @@ from expdesign.vessel import (
 )
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, parse_expression
 
-CORRELATION_ROUNDING = 1e-6
-"""Negative eigenvalue that rounded correlations may have."""
+CORRELATION_ROUNDING = 1e-6  # negative eigenvalue that rounded correlations may have
 
 
 def load_vessel(path: Path | str) -> Vessel:

@@ -193,8 +193,7 @@ ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
 }
 """Kind of actuator -> its table."""
 
-SAME_AS = {"podded": "azimuth"}
-"""Kind in a file -> the kind it is a case of."""
+SAME_AS = {"podded": "azimuth"}  # kind in a file -> the kind it is a case of
 
 
 class TermTable(Table):

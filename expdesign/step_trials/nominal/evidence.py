@@ -14,8 +14,7 @@ from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
-SHORTEST_S = 1e-3
-"""Time constants below this, and negative ones, count as this [s]."""
+SHORTEST_S = 1e-3  # time constants below this, and negative ones, count as this [s]
 LEAST_LOG_STD = 1e-3
 
 
@@ -114,12 +113,9 @@ def _change(one: StepSample) -> float:
 
 
 HALVINGS = 24
-DRIFT, MOST_DRIFT = 0.999, 0.99
-"""Sine of the largest drift angle that is sought, and from which there counts as none."""
-NUDGE = 1e-4
-"""Step of a velocity, for derivatives [m/s, rad/s]."""
-LARGEST_ERROR = 1e3
-"""Largest error of a steady state, in standard errors; beyond it the model has none near by."""
+DRIFT, MOST_DRIFT = 0.999, 0.99  # sine of the largest drift angle that is sought, and from which there counts as none
+NUDGE = 1e-4  # step of a velocity, for derivatives [m/s, rad/s]
+LARGEST_ERROR = 1e3  # largest error of a steady state, in standard errors; beyond it the model has none near by
 
 
 def compared(

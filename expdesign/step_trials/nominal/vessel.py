@@ -31,16 +31,12 @@ from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel, with_response_values
 
-MOST_STEPS = 60
-"""Largest number of Gauss-Newton steps between two enlargements of errors."""
-TIMES = 4
-"""Errors of both dead times, and of both kinds of time constants by their definition."""
-FARTHEST = 5.0
-"""Largest value of each of these errors, in standard deviations: steps far beyond have no effect."""
+MOST_STEPS = 60  # largest number of Gauss-Newton steps between two enlargements of errors
+TIMES = 4  # errors of both dead times, and of both kinds of time constants by their definition
+FARTHEST = 5.0  # largest value of each of these errors, in standard deviations: steps far beyond have no effect
 CURRENT_STD_MPS = 0.2
 """Standard deviation of a steady current to north and to east, a current of its own in each record."""
-ROUNDS = 4
-"""Largest number of enlargements of errors."""
+ROUNDS = 4  # largest number of enlargements of errors
 FORM_STD = 0.03
 """Relative error of what one time constant says about a response of another form; chosen from simulations."""
 

@@ -12,8 +12,7 @@ from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, page_of, shown_job, wrong
 
-LOGS = "logs"
-"""Folder of logs that were dropped in."""
+LOGS = "logs"  # folder of logs that were dropped in
 PAGES = {
     requests.Import: "import.html",
     requests.Estimate: "estimate.html",

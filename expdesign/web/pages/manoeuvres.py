@@ -13,8 +13,7 @@ from expdesign.web import answers
 from expdesign.web.forms import Form
 from expdesign.web.site import Site, Watched, framed, spelled, told
 
-SIZE_PX = 120
-"""Of a drawn manoeuvre."""
+SIZE_PX = 120  # of a drawn manoeuvre
 
 
 def register(site: Site) -> None:

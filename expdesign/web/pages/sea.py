@@ -20,8 +20,7 @@ from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.forms import Form
 from expdesign.web.site import Site, Watched, framed, spelled, told, wrong
 
-DEGREES = 7
-"""Decimals of positions that are written, about a centimetre."""
+DEGREES = 7  # decimals of positions that are written, about a centimetre
 LEGEND = (
     ("water to plan in", "#dcebf5"),
     ("water too shallow or closed", "#d9a5a0"),

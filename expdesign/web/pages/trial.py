@@ -108,8 +108,7 @@ def _go(scenario: str, card: str) -> None:
 
 
 EDITED = (".toml", ".md", ".csv", ".geojson")
-LARGEST = 2**20
-"""Bytes of a file that is edited as text."""
+LARGEST = 2**20  # bytes of a file that is edited as text
 
 
 def register_files(site: Site) -> None:

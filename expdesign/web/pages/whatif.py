@@ -15,8 +15,7 @@ from expdesign.scenario.variants import changed_entries
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, page_of, shown_job, wrong
 
-OF_ANOTHER = ("scenario.vessel =", "scenario.area =")
-"""Changes; a scenario with both is no variant of this trial."""
+OF_ANOTHER = ("scenario.vessel =", "scenario.area =")  # changes; a scenario with both is no variant of this trial
 FIRST = "[design]\ntotal_s = 1800.0\n"
 
 

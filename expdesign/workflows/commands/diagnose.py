@@ -32,8 +32,7 @@ from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.outcome import Outcome, finished, shared, workflow
 from expdesign.workflows.steps.measured import doubted, equipped, measured
 
-SINCE_CHANGE = "since-change.csv"
-"""File that a watch leaves for a diagnosis."""
+SINCE_CHANGE = "since-change.csv"  # file that a watch leaves for a diagnosis
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 

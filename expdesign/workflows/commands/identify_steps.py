@@ -31,8 +31,7 @@ from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
-SIMULATED_STEP_S = 0.5
-"""Least time between samples of a simulation that is compared with data [s]."""
+SIMULATED_STEP_S = 0.5  # least time between samples of a simulation that is compared with data [s]
 
 
 @workflow

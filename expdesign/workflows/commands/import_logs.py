@@ -71,8 +71,7 @@ from expdesign.workflows.outcome import Outcome, workflow
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
 MOST_COMPARED = 200_000
 """Rows in which instruments are compared with each other: more tell nothing new, and would fill the memory."""
-WRITTEN_AT_ONCE = 20_000
-"""Rows."""
+WRITTEN_AT_ONCE = 20_000  # rows
 MOVED = 3.0  # standard errors from which a computer's clock is set by what another file saw
 FORMATS = {"time_s": "%.6f", "lat_deg": "%.9f", "lon_deg": "%.9f"}
 PRESUMED = (

@@ -108,10 +108,8 @@ def _watching(table: Mapping[str, Any]) -> Watching:
 
 
 STATE, SINCE_CHANGE = "monitor-state.json", "since-change.csv"
-MOST_ROWS = 20_000
-"""Largest number of rows in a piece of a file."""
-WRITTEN_EVERY_S = 20.0
-"""Time between writing files, from which a watch that is ended by force goes on [s]."""
+MOST_ROWS = 20_000  # largest number of rows in a piece of a file
+WRITTEN_EVERY_S = 20.0  # time between writing files, from which a watch that is ended by force goes on [s]
 
 
 @workflow

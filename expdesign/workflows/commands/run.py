@@ -66,8 +66,7 @@ def _plan(request: requests.Plan, case: Scenario, progress: Progress) -> Outcome
 
 WORK = (0.05, 0.08, 0.02, 0.68, 0.17)
 """Share of the work: scoring, durations, comparing criteria, planning, and writing."""
-WORK_OF_SEARCH = (0.01, 0.02, 0.01, 0.90, 0.06)
-"""The same where the shortest day is searched for."""
+WORK_OF_SEARCH = (0.01, 0.02, 0.01, 0.90, 0.06)  # the same where the shortest day is searched for
 
 
 @workflow

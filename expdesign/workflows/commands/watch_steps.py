@@ -52,11 +52,9 @@ STATE = "watch-steps-state.json"
 TO_DO = "steps-to-do.csv"
 LEARN_S, LEARN_SHARE = 120.0, 0.8
 """Time of the first hold from which the noise is learnt [s], and its largest share of the planned one."""
-WRITTEN_EVERY_S = 20.0
-"""Time between writing the state where nothing happens [s]."""
+WRITTEN_EVERY_S = 20.0  # time between writing the state where nothing happens [s]
 READ = ("u_mps", "r_radps")
-COMPARED_ROWS = 50
-"""First rows, whose inputs are compared with the limits of the vessel file."""
+COMPARED_ROWS = 50  # first rows, whose inputs are compared with the limits of the vessel file
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,12 +34,9 @@ from expdesign.workflows.steps.planned import check_plannable, plan_document
 from expdesign.workflows.steps.scored import ready, scored
 
 WHOLE_RUNS = "repeats"
-SEARCHED = 0.1
-"""Share of the work that is done once for all cases, where trials are planned."""
-WORKED = 0.95
-"""Share of the work that the cases are."""
-SHARES = (0.25, 0.5, 2.0, 4.0)
-"""Of the time of all runs, for which the accuracy is shown as well."""
+SEARCHED = 0.1  # share of the work that is done once for all cases, where trials are planned
+WORKED = 0.95  # share of the work that the cases are
+SHARES = (0.25, 0.5, 2.0, 4.0)  # of the time of all runs, for which the accuracy is shown as well
 WORK = (0.5, 0.5, 10.0, 0.5)
 """Relative times of the parts of a case: scoring, sharing out time, planning, comparing criteria."""
 

@@ -19,10 +19,8 @@ from expdesign.vessel import NOT_ACTING_BACK
 from expdesign.workflows.outcome import Outcome, finished
 from expdesign.workflows.steps.measured import measured
 
-DRAFT = ("refused.json", "refused.html")
-"""Names of the files of a draft; no results have them."""
-PLAN = "plan.json"
-"""Name of a file that every plan has."""
+DRAFT = ("refused.json", "refused.html")  # names of the files of a draft; no results have them
+PLAN = "plan.json"  # name of a file that every plan has
 ScenarioRequest = (
     requests.Run | requests.Plan | requests.Score | requests.Durations | requests.Foresee | requests.Replan
 )

@@ -37,8 +37,7 @@ ones."""
 LEG_SPEED = 0.97
 """Speed of legs as a share of the top speed, where [plan] states none: faster legs save more than steering then
 loses."""
-WORK = (0.2, 0.8)
-"""Share of the work: the search for manoeuvres, and for the shortest day."""
+WORK = (0.2, 0.8)  # share of the work: the search for manoeuvres, and for the shortest day
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

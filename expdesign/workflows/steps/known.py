@@ -22,8 +22,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.structures import SHOAL
 
-MATTERS = 1.05
-"""Factor of a parameter's standard deviation without some runs from which these are named for it."""
+MATTERS = 1.05  # factor of a parameter's standard deviation without some runs from which these are named for it
 
 
 def updated(

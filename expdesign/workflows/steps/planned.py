@@ -219,8 +219,7 @@ def _risk_summary(risk: RiskEstimate | None) -> dict[str, object]:
     }
 
 
-SAILED_BY = ("route.*", "cards.html", "commands.csv")
-"""Names of files by which a trial is sailed."""
+SAILED_BY = ("route.*", "cards.html", "commands.csv")  # names of files by which a trial is sailed
 
 
 def trial_files(

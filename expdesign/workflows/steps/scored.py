@@ -19,10 +19,8 @@ from expdesign.scenario import Scenario
 from expdesign.signals import Commands, Trajectory
 from expdesign.vessel import Environment, Vessel, column_name
 
-SPEED_SLACK = 0.1
-"""Share of the largest speed of the data by which a run may go beyond them."""
-FAR_FROM_LIMIT = 0.5
-"""Share of an actuator's limit below which no run comes near it."""
+SPEED_SLACK = 0.1  # share of the largest speed of the data by which a run may go beyond them
+FAR_FROM_LIMIT = 0.5  # share of an actuator's limit below which no run comes near it
 IDLE = 1e-9
 """Share of an actuator's limit, or command where it has none, up to which it is not used: what rounding leaves."""
 

@@ -19,8 +19,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 STEP_FAMILIES = ("throttle_steps", "rudder_steps")
-USUAL_INTERVAL_S = 1.0
-"""Time between rows of a list that has one row [s]."""
+USUAL_INTERVAL_S = 1.0  # time between rows of a list that has one row [s]
 
 
 Listing = tuple[Array, Sequence[int | None] | None, float]

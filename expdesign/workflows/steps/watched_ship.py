@@ -102,10 +102,8 @@ def ship_grams(
     return grams_and_noise(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, known=known)
 
 
-FEWEST_LINES = 4
-"""Fewest lines of a piece that is read."""
-PIECE = "piece.csv"
-"""Name of a piece as a file, in notes."""
+FEWEST_LINES = 4  # fewest lines of a piece that is read
+PIECE = "piece.csv"  # name of a piece as a file, in notes
 
 
 @dataclass(frozen=True, kw_only=True)

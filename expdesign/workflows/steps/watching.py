@@ -39,16 +39,12 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.workflows.steps.watched_ship import PIECE, Asked, Known, Late, Read, Unread
 
-BETWEEN_FILES_S = 3600.0
-"""Time from the end of a file to the beginning of the next, where its times begin again [s]."""
-CORRECTION_S = 120.0
-"""Time by which a clock that is put back is taken to have been corrected [s]."""
-MOST_SAVED_ROWS = 7200
-"""Largest number of rows saved since a change, for a diagnosis."""
+BETWEEN_FILES_S = 3600.0  # time from the end of a file to the beginning of the next, where its times begin again [s]
+CORRECTION_S = 120.0  # time by which a clock that is put back is taken to have been corrected [s]
+MOST_SAVED_ROWS = 7200  # largest number of rows saved since a change, for a diagnosis
 KEPT_ROWS = 7200
 """Rows before the last piece that are kept, at least where there are so many: a change may have begun in them."""
-MOST_MOMENTS = 1000
-"""Largest number of moments kept for the page."""
+MOST_MOMENTS = 1000  # largest number of moments kept for the page
 HOUR, DAY = 3600.0, 86_400.0
 MOMENT_S = 600.0  # of data between two points of the page's figures, at most
 
