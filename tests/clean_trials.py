@@ -35,8 +35,7 @@ SHIP_50M = Vessel(
 )  # fmt: skip
 HELD_S = (20.0, 60.0)
 AXES = ("u_mps", "v_mps", "r_radps"), ("north_m", "east_m", "heading_rad")
-SEARCHED = ("change", "deadband", "roll")
-"""Kinds of candidates of which several share a number that is looked for."""
+SEARCHED = ("change", "deadband", "roll")  # kinds of candidates of which several share a number that is looked for
 
 
 def at_rate(vessel: Vessel, sample_time_s: float) -> Vessel:

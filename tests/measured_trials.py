@@ -16,8 +16,7 @@ VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"
 MODEL_SHIP, TUG = VESSELS / "model-ship.toml", VESSELS / "azimuth-30m.toml"
 MODEL_SHIP_TRUE = load_vessel(VESSELS / "model-ship-true.toml")
 TUG_TRUE = load_vessel(VESSELS / "azimuth-30m-true.toml")
-EULER = {"integrator": "euler", "substeps": 1}
-"""The map that the parameters of the example ships are defined by."""
+EULER = {"integrator": "euler", "substeps": 1}  # the map that the parameters of the example ships are defined by
 
 
 def quiet(vessel: Vessel) -> Vessel:

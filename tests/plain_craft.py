@@ -17,12 +17,9 @@ import scipy
 from expdesign.signals import Batch, Record
 
 STEP_S = 0.2
-SPEED_PER_RPS = 0.4
-"""S [m/s per rps]."""
-RATE_PER_RAD = 0.6
-"""K [rad/s per rad]."""
-CONSTANTS_S = (4.0, 1.5)
-"""T_U and T_r."""
+SPEED_PER_RPS = 0.4  # s [m/s per rps]
+RATE_PER_RAD = 0.6  # k [rad/s per rad]
+CONSTANTS_S = (4.0, 1.5)  # T_U and T_r
 ROUND = tuple((n, 0.2) for n in (4.0, 7.0, 10.0, 13.0, 10.0, 7.0, 4.0)) + tuple(
     (10.0, angle) for angle in (0.1, 0.2, 0.3, 0.4, 0.3, 0.2, 0.1)
 )

@@ -36,8 +36,7 @@ K = MASS_KG * G * GM_M - G * S0
 A1 = MASS_KG * G * GM_M * (PERIOD_S / (2 * np.pi)) ** 2
 D = 2 * 0.05 * np.sqrt(MASS_KG * G * GM_M * A1)
 K_VD, K_R, K_DELTA = 0.25e6, -0.6e6, 0.35e6
-KNOWN, UNKNOWN = (5000.0, 5.0), (5000.0, 6.0)
-"""Mass [kg] and height [m] of the known and of the unknown load."""
+KNOWN, UNKNOWN = (5000.0, 5.0), (5000.0, 6.0)  # mass [kg] and height [m] of the known and of the unknown load
 STEP_S = 0.1
 
 

@@ -32,8 +32,7 @@ MODEL_SHIP_TRUTH = parameters(
 """Near the estimates of the thesis's model ship (its tables of chapter 6)."""
 System = tuple[Array, Array, Array, Array]
 Helm = tuple[float, float, float]
-SERVO_S = 0.1
-"""Lag of the rudder behind its orders."""
+SERVO_S = 0.1  # lag of the rudder behind its orders
 
 
 @dataclass(frozen=True, kw_only=True)

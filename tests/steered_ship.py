@@ -10,8 +10,7 @@ from expdesign.vessel import Actuator, Limit, Term, VesselModel
 TRUTH = {"X_u": -0.1, "X_mu": 0.02}
 NAMES = ("tau_x", "tau_y", "tau_psi")
 NOISE_MPS = 0.01
-GAIN = 20.0
-"""Force for a metre per second too slow: the speed returns in two samples or three."""
+GAIN = 20.0  # force for a metre per second too slow: the speed returns in two samples or three
 
 
 def surge_model() -> VesselModel:

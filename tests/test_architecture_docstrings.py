@@ -7,8 +7,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "expdesign"
-ENTRY = re.compile(r"^( +)([A-Za-z_][\w, ]*): ")
-"""Indented names, before what they are."""
+ENTRY = re.compile(r"^( +)([A-Za-z_][\w, ]*): ")  # indented names, before what they are
 
 
 def described(docstring: str, section: str) -> list[str]:

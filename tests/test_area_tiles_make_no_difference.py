@@ -11,8 +11,7 @@ from expdesign.plan.chart import CORNERS, simplified, visibility_graph
 from expdesign.sea_area import moved
 
 HALF_M = 500.0
-SHARES = 0.4, 1.0
-"""Least and largest radius of a corner of an island, in shares of the island's."""
+SHARES = 0.4, 1.0  # least and largest radius of a corner of an island, in shares of the island's
 
 
 def islands(seed: int, *, corners: int, radius_m: float = 40.0, count: int = 60) -> shapely.Geometry:

@@ -19,8 +19,7 @@ from expdesign.vessel import Limit, Sensors
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)
 IDEAL = sea.Sensors(position=0.0, heading=0.0, velocity=0.0, yaw_rate=0.0, wind=0.0)
 LIMITS = Limit(low=-12.0, high=12.0), Limit(low=-1.0, high=1.0)
-START = 60
-"""Compared samples that it takes to forget a first state read from a straight line."""
+START = 60  # compared samples that it takes to forget a first state read from a straight line
 
 
 @cache

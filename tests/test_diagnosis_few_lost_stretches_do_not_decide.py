@@ -22,8 +22,7 @@ from expdesign.diagnosis.select.backward_elimination import compared_with, impro
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from held_out_cases import errors, steps_of
 
-OPEN = np.array([[-6.0], [-6.0], [9.0], [9.0], [9.0], [9.0]])
-"""Gains of six runs, 4 points on average and perhaps none."""
+OPEN = np.array([[-6.0], [-6.0], [9.0], [9.0], [9.0], [9.0]])  # gains of six runs, 4 points on average and perhaps none
 
 
 def test_the_error_of_constants_is_the_variance_about_the_means_of_runs():

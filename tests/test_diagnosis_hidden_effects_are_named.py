@@ -26,8 +26,7 @@ CASES = (
     ("coaster", "actuator_lag", {"lag_s": 5.0, "acts_on": 0b10}, {}, "lag_rudder_s", 5.0),
     ("barge", "missing_term:N_rrr", {"N_rrr": -60.0}, {}, "N_rrr", -60.0),
 )
-DEFAULT = (0, 10, 14)
-"""Tried in every run of the tests; the others take minutes."""
+DEFAULT = (0, 10, 14)  # tried in every run of the tests; the others take minutes
 
 
 def check(case, *, seed, relative_std=0.0, **size):

@@ -160,8 +160,7 @@ def test_a_lag_of_propellers_that_is_longer_than_stated_is_found():
 
 
 LATE_S = 0.6
-OFF = [("barge", 1, 3), pytest.param("coaster", 3, 4, marks=pytest.mark.thorough)]
-"""Ship, seed, runs."""
+OFF = [("barge", 1, 3), pytest.param("coaster", 3, 4, marks=pytest.mark.thorough)]  # ship, seed, runs
 
 
 def late(ship: str, seed: int, runs: int, *, off: float) -> Record:

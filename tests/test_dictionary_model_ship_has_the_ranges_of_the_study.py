@@ -5,8 +5,7 @@ import pytest
 from design_case import example_dictionary, vessel
 
 PRIMITIVES = {primitive.name[:5]: primitive for primitive in example_dictionary("model-ship")}
-SHARE = 0.01
-"""Overshoot and shortfall allowed to the simulated motion, of the published range."""
+SHARE = 0.01  # overshoot and shortfall allowed to the simulated motion, of the published range
 
 
 def reach(name: str) -> tuple[tuple[float, float], ...]:

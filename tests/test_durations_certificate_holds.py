@@ -19,8 +19,7 @@ from expdesign.information import MEAN_SUBTRACTIONS
 from expdesign.simulation import CALM
 from expdesign.values import Array
 
-CERTIFICATE = 1e-6
-"""Relative to the dimension: what a certificate must reach to be returned."""
+CERTIFICATE = 1e-6  # relative to the dimension: what a certificate must reach to be returned
 EXAMPLES = {"model-ship": ("model-ship", CALM, 450.0), "standard": ("azimuth-30m", WIND, 3600.0)}
 subtractions = pytest.mark.parametrize("subtraction", MEAN_SUBTRACTIONS)
 dictionaries = pytest.mark.parametrize("dictionary", EXAMPLES)

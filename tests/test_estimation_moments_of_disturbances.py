@@ -11,8 +11,7 @@ from expdesign.estimation.methods import estimate
 from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Sensors, Vessel, VesselModel
 
-SKEW = np.array([0.3, -0.1])
-"""A current whose two components differ in size, so that its second moments differ, too."""
+SKEW = np.array([0.3, -0.1])  # a current whose two components differ in size, so that its second moments differ, too
 
 
 def waterborne(model: VesselModel) -> VesselModel:

@@ -19,8 +19,7 @@ from expdesign.workflows import measured
 from instrumented_ship import KINDS, NAMES, POSE, Log, voyages, write_log, write_vessel
 from sample_files import outside, outside_record
 
-COUNT = 8
-"""Voyages of each fault."""
+COUNT = 8  # voyages of each fault
 
 
 @pytest.fixture(scope="module")

@@ -147,8 +147,7 @@ def test_the_threshold_grows_with_the_time_between_false_alarms() -> None:
 
 HOUR = 3600.0
 SEEDS = range(20, 28)
-CALL = 60
-"""Stretches before a port call."""
+CALL = 60  # stretches before a port call
 
 
 def with_call(seed: int, load: np.ndarray, later: np.ndarray) -> Grams:
@@ -214,8 +213,7 @@ def test_sizes_carry_the_errors_of_the_reference(calibration: Calibration) -> No
     assert np.all(np.diag(beside_baseline(state.whole, short)[1]) < np.diag(information))
 
 
-BENT = 0.1
-"""Second-order part of the error, by which a change of three sizes acts a third more than it does when small."""
+BENT = 0.1  # second-order part of the error, by which a change of three sizes acts a third more than it does when small
 
 
 def bent(columns: np.ndarray, change: np.ndarray, since: int) -> tuple[Grams, Callable[[np.ndarray, float], Grams]]:

@@ -37,8 +37,7 @@ from plan_case import area, at_rest, find_leg, leg_water, primitive, random_path
 OPEN = shapely.box(-1000, -1000, 1000, 1000)
 WALL = shapely.box(-10, -1000, 10, 300)
 ENDS = (np.array([0.0, -200.0, 0.0]), np.array([0.0, 200.0, 0.0]))
-STILL = Headway(speed_mps=1.0, current_to=np.zeros(2))
-"""A metre takes a second."""
+STILL = Headway(speed_mps=1.0, current_to=np.zeros(2))  # a metre takes a second
 
 
 def steady(speed_mps: float, rate_mps2: float, top_mps: float) -> LegEnd:

@@ -12,8 +12,7 @@ from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
 from short_examples import SHORTER, copied, example_run
 
-FLIP = np.array([1.0, -1.0, -1.0])
-"""North, east, heading; or forces ahead, to starboard, about the vertical."""
+FLIP = np.array([1.0, -1.0, -1.0])  # north, east, heading; or forces ahead, to starboard, about the vertical
 TURNED = 0.10
 """Largest change of cost when the chart is turned: placements are found on grids, which turn with no chart."""
 

@@ -80,8 +80,7 @@ def test_a_current_as_fast_as_the_ship_is_named():
     assert "no single change of those tried helps" in text
 
 
-CURRENT = np.array([3.0, 0.0])
-"""To the north [m/s], slower than the coaster on legs, and faster than she goes sideways."""
+CURRENT = np.array([3.0, 0.0])  # to the north [m/s], slower than the coaster on legs, and faster than she goes sideways
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 60.0, 90.0, 180.0, 270.0])

@@ -18,14 +18,10 @@ from expdesign.workflows.steps.scored import scored
 from whole_days import simulated_days
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
-TRIALS = 24
-"""More take long: `tests/benchmarks/stated_accuracy.py` has 500."""
-UNKNOWN = Environment(current_std_mps=0.15)
-"""As the story's forecast."""
-FIRST_ORDER = 0.1
-"""What the noise beyond first order may add or take."""
-RARE = norm.sf(3.5)
-"""Chance of each one-sided test: with ten parameters one in 200 such tests is beyond."""
+TRIALS = 24  # more take long: `tests/benchmarks/stated_accuracy.py` has 500
+UNKNOWN = Environment(current_std_mps=0.15)  # as the story's forecast
+FIRST_ORDER = 0.1  # what the noise beyond first order may add or take
+RARE = norm.sf(3.5)  # chance of each one-sided test: with ten parameters one in 200 such tests is beyond
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,7 @@ from expdesign.workflows.outcome import workers
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-MANY = 30
-"""Tasks, more than are begun at once."""
+MANY = 30  # tasks, more than are begun at once
 WAYS = (in_order, as_finished)
 
 

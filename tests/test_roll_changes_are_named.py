@@ -20,10 +20,8 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 SHIP = roll_model()
 assert SHIP.pendulum is not None
 PARAMETERS = SHIP.pendulum.parameters
-KNOWN = replace(SHIP.pendulum, parameter_std={})
-"""A file that is certain."""
-LOST_GM = {"k": PARAMETERS["k"] - 0.2 * KNOWN.righting_nm}
-"""The metacentric height is less by a fifth."""
+KNOWN = replace(SHIP.pendulum, parameter_std={})  # a file that is certain
+LOST_GM = {"k": PARAMETERS["k"] - 0.2 * KNOWN.righting_nm}  # the metacentric height is less by a fifth
 CHANGES: dict[str, tuple[dict[str, float], Load]] = {
     "k": (LOST_GM, NOMINAL),
     "d": ({"d": 1.5 * PARAMETERS["d"]}, NOMINAL),

@@ -19,8 +19,7 @@ from sample_files import outside
 from scenario_files import AREA, collection, feature, spoil, square, write_scenario
 
 LAT, LON = 54.5, 18.6
-M_PER_DEGREE = (110_574.4, 111_319.49)
-"""Of latitude and longitude at the equator, where the small charts lie."""
+M_PER_DEGREE = (110_574.4, 111_319.49)  # of latitude and longitude at the equator, where the small charts lie
 
 
 def plain(*rings, kind="Polygon", **properties):

@@ -13,8 +13,7 @@ from scenario_files import collection, feature, square
 
 PLACE = [0.002, 0.001]
 NEEDED_M, MARGIN_M = 3.5, 25.0
-LAND = feature("land", square(0.02), square(0.008)[::-1])
-"""A frame of land round a square of water."""
+LAND = feature("land", square(0.02), square(0.008)[::-1])  # a frame of land round a square of water
 
 
 def danger(layer="points", kind="Point", at=PLACE, **properties):

@@ -27,8 +27,7 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 
 AZIMUTHS = vessel("azimuth-30m")
 FASTEST = np.array([[-1.45, 1.45], [-0.7, 0.7], [-0.1, 0.1]])
-FEW = 4000
-"""Boxes; the bound holds with any number of them."""
+FEW = 4000  # boxes; the bound holds with any number of them
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SUBTRACTIONS = ("none", "batch", "complete")
 

@@ -42,8 +42,7 @@ def day(made_once):
     return folder, scenario, drafted
 
 
-STEP_MPS = 1e-3
-"""Of differences by the current."""
+STEP_MPS = 1e-3  # of differences by the current
 
 
 def log_det_beside_current(vessel, motion, commands, parameters):

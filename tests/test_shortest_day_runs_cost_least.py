@@ -20,8 +20,7 @@ PARAMETERS = ("X_u", "Y_v", "N_r")
 SAMPLES = 100.0
 
 
-EVERY = np.array(list(itertools.product(range(10), repeat=4)), dtype=float)
-"""(10000, 4) numbers of runs."""
+EVERY = np.array(list(itertools.product(range(10), repeat=4)), dtype=float)  # (10000, 4) numbers of runs
 
 
 def least_cost_s(accuracy, known, matrices, cost_s):

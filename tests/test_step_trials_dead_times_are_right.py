@@ -12,8 +12,7 @@ from expdesign.step_trials.identify import dead_time, turn_entry
 from expdesign.step_trials.responses import Transient, fit_first_order, second_order, shared_delay
 from expdesign.step_trials.samples import Plateau, StepSample
 
-DELAY_S, DAMPING, ZERO = 0.5, 1.3, 0.65
-"""Of a hull whose speed over length differs from step to step."""
+DELAY_S, DAMPING, ZERO = 0.5, 1.3, 0.65  # of a hull whose speed over length differs from step to step
 
 
 def hull_steps(seed: int, *, std: float, count: int = 5) -> list[Transient]:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import casadi
 import numpy as np
 
-STEPS = 60
-"""Intervals of the transfer."""
+STEPS = 60  # intervals of the transfer
 
 
 @dataclass(frozen=True)

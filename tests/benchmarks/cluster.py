@@ -40,16 +40,11 @@ from expdesign.plan.monte_carlo import estimate_risk
 from expdesign.processes import on_cluster, sharing
 from expdesign.scenario import load_scenario
 
-PUBLISHED = ROOT / "tests" / "benchmarks" / "published"
-"""Folder whose modules workers import too."""
-MANY = 100
-"""Workers that are calculated with."""
-TRIALS, DRAWS, RUNS = 20, 10_000, 40
-"""Of each design, of a plan, and of the study."""
-TOTALS_S = tuple(range(240, 720, 30))
-"""Informative times of the variants."""
-PLANNED = 2
-"""Variants that are planned too."""
+PUBLISHED = ROOT / "tests" / "benchmarks" / "published"  # folder whose modules workers import too
+MANY = 100  # workers that are calculated with
+TRIALS, DRAWS, RUNS = 20, 10_000, 40  # of each design, of a plan, and of the study
+TOTALS_S = tuple(range(240, 720, 30))  # informative times of the variants
+PLANNED = 2  # variants that are planned too
 MIB = 2**20
 
 

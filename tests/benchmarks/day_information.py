@@ -17,12 +17,9 @@ from pathlib import Path
 import numpy as np
 
 VESSEL = Path(__file__).parents[2] / "scenarios/vessels/azimuth-30m.toml"
-WIND_TO_MPS = 3.0, 2.0
-"""North, east: forecast of the scenario."""
-STEP_MPS = 1e-3
-"""Of differences by the current."""
-LEVER_M = 9.0
-"""Of the thrusters."""
+WIND_TO_MPS = 3.0, 2.0  # north, east: forecast of the scenario
+STEP_MPS = 1e-3  # of differences by the current
+LEVER_M = 9.0  # of the thrusters
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:

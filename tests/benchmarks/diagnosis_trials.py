@@ -28,8 +28,7 @@ from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 
 LEAST_POINTS, GROWTH, MOST_GROWTHS = 5.0, 1.5, 6
-LEVELS = (0.03, 0.1, 0.3, 1.0)
-"""Sizes in the power part, in shares of the size that just costs the points asked."""
+LEVELS = (0.03, 0.1, 0.3, 1.0)  # sizes in the power part, in shares of the size that just costs the points asked
 UNSEEN = {"gyro_scale": ("measured",), "gyro_bias": ("measured",), "sensor_delay": ("measured",)}
 """Faults of sensors that other ways of recording do without."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")

@@ -51,8 +51,7 @@ from expdesign.workflows.steps.design_problem import duration_problem as stated_
 from expdesign.workflows.steps.scored import ready
 
 COUNT, PARAMETERS, OUTPUTS = 1000, 18, 3
-PATIENCE_S = 20.0
-"""Baselines are stopped after this time."""
+PATIENCE_S = 20.0  # baselines are stopped after this time
 
 
 EXAMPLES = ("helsinki", "story", "harbour", "narrows", "coaster", "model-ship", "fast-boat-designed", "roll-trial")

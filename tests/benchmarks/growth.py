@@ -38,13 +38,10 @@ from expdesign.sea_area import LocalFrame
 from expdesign.workflows import plan_problem
 from main_job import SCENARIOS
 
-SHARES = 0.8, 1.0
-"""Least and largest share of the settings of a manoeuvre of which candidates are made."""
+SHARES = 0.8, 1.0  # least and largest share of the settings of a manoeuvre of which candidates are made
 SCALED = ("speed_mps", "turn_speed_mps", "sway_mps", "yaw_rate_radps")
-CHART_M = 11_000.0
-"""Width of the archipelago."""
-APART_M = 2000.0
-"""Distance between its start and goal at least."""
+CHART_M = 11_000.0  # width of the archipelago
+APART_M = 2000.0  # distance between its start and goal at least
 FRAME = LocalFrame(lat_deg=60.0, lon_deg=25.0)
 
 

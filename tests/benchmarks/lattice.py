@@ -20,8 +20,7 @@ from expdesign.plan.search.lattice import search_lattice
 from lattice_case import Run, as_problem, astar_thesis, dijkstra_plain, random_world
 
 THREE = (Run(5, 0, 0, 1), Run(3, 0, 0, 2), Run(0, 4, 0, 1))
-BEST_OF = 3
-"""Each search is timed as its quickest run of so many."""
+BEST_OF = 3  # each search is timed as its quickest run of so many
 FIVE = (*THREE, Run(4, 2, 1, 1), Run(0, 0, 0, 3))
 
 

@@ -58,10 +58,8 @@ EXPECTED = {
     "wind in yaw over an hour": ("push:r",),
 }
 """Effects that name each case; a push is one of the weather, which is not the ship's."""
-WITHIN = 1.96
-"""Standard errors that 95 % of the sizes are to be within."""
-STEADY_S = 120
-"""Time without another set point from which speed counts as steady [s]."""
+WITHIN = 1.96  # standard errors that 95 % of the sizes are to be within
+STEADY_S = 120  # time without another set point from which speed counts as steady [s]
 
 
 def as_record(vessel: Vessel, table: np.ndarray) -> Record:

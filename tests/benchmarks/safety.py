@@ -40,8 +40,7 @@ from shared_work import add_sharing, shared_work
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 WANDERING = 1.0, 300.0
 """How much current and wind wander, in the standard deviations with which their means are known, and how slowly [s]."""
-AT_ALL = 1e6
-"""Value of all tolerances with which every ship begins at once, in the units of each."""
+AT_ALL = 1e6  # value of all tolerances with which every ship begins at once, in the units of each
 
 
 def wandering(forecast: Environment) -> Environment:

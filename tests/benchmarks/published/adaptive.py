@@ -34,8 +34,7 @@ from expdesign.vessel import Vessel
 SCENARIOS = Path(__file__).resolve().parents[3] / "scenarios"
 WIND = Environment(wind_to=np.array([3.0, 2.0]))
 """As in scenarios/helsinki.toml: without wind its parameters cannot be estimated."""
-RUN_S = 120.0
-"""Length of runs added to the standard trials."""
+RUN_S = 120.0  # length of runs added to the standard trials
 BOOTSTRAPS = 200
 
 

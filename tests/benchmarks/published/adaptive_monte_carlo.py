@@ -24,10 +24,8 @@ from expdesign.simulation import CALM, Environment, Variation, simulate_ensemble
 from expdesign.values import Array, seal
 from expdesign.vessel import Sensors, Vessel
 
-VARIANCE = 0.025
-"""Of u_c, v_c and of the error of every output."""
-KEPT, TRIMMINGS = 0.95, 10
-"""Share of the runs that count as not wild, and how often those are chosen anew."""
+VARIANCE = 0.025  # of u_c, v_c and of the error of every output
+KEPT, TRIMMINGS = 0.95, 10  # share of the runs that count as not wild, and how often those are chosen anew
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

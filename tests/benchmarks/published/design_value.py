@@ -66,10 +66,8 @@ Progress = Callable[[str, float], None]
 ERROR_LIMIT, NORM_LIMIT = 1.5, 0.15
 OPTIMISED, SOURCE, EQUAL, RANDOM = "optimised", "source's shares", "equal shares", "random"
 DESIGNS = (OPTIMISED, SOURCE, EQUAL, RANDOM)
-SEGMENTS = 5
-"""Of a random design."""
-SOURCE_SHARES = {1: 0.16, 2: 0.04, 5: 0.09, 6: 0.42, 8: 0.04, 11: 0.25}
-"""Number of the primitive -> share (9.1.1)."""
+SEGMENTS = 5  # of a random design
+SOURCE_SHARES = {1: 0.16, 2: 0.04, 5: 0.09, 6: 0.42, 8: 0.04, 11: 0.25}  # number of the primitive -> share (9.1.1)
 PUBLISHED = {OPTIMISED: (0.99, 0.99), RANDOM: (0.46, 0.69)}
 """Design -> share of trials below ERROR_LIMIT (more than 0.99 for the first), and below NORM_LIMIT (9.1.2)."""
 UNSEEN = PrimitiveSpec(

@@ -67,8 +67,7 @@ HELD_OUT: dict[str, dict[str, tuple[str, ...]]] = {
     },
 }
 """Folder -> name of a group of runs -> how the names of its files begin."""
-TRIPLE = 3
-"""Runs of a trial."""
+TRIPLE = 3  # runs of a trial
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -29,19 +29,13 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel
 
 AHEAD_S = 30.0
 OFFSET_RAD, BIAS_RAD, GAIN, DELAY_S, CURRENT_MPS = np.radians(2.0), np.radians(3.0), 0.9, 1.0, 0.07
-LEAD_S = 1.5
-"""By which orders are made early to find a dead time below zero."""
+LEAD_S = 1.5  # by which orders are made early to find a dead time below zero
 SCALE, ARM_M, LATE_S, RATE_RADPS = 0.95, 0.7, 0.7, 0.07
-CERTAIN = 5.0
-"""Parameters that are so many standard deviations from zero may be taken out."""
-LEAST_COST = 0.1
-"""Relative growth of some error 30 s ahead by which a term that is taken out must show."""
-SEEN = 0.05
-"""p-value of an oracle that sees: six stretches give no less than 0.016."""
-STD = 2.5
-"""Standard errors within which a size is right."""
-OF_MODEL = ("delay:all", "offset:rudder", "offset:a")
-"""Effects that a model may lack before a fault."""
+CERTAIN = 5.0  # parameters that are so many standard deviations from zero may be taken out
+LEAST_COST = 0.1  # relative growth of some error 30 s ahead by which a term that is taken out must show
+SEEN = 0.05  # p-value of an oracle that sees: six stretches give no less than 0.016
+STD = 2.5  # standard errors within which a size is right
+OF_MODEL = ("delay:all", "offset:rudder", "offset:a")  # effects that a model may lack before a fault
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -351,8 +345,7 @@ def estimates(item: Finding, found: Diagnosis) -> dict[str, tuple[float, float]]
     return rows
 
 
-EARLY_POSITIONS = "later than the positions"
-"""What the record says of early positions, apart from late velocities."""
+EARLY_POSITIONS = "later than the positions"  # what the record says of early positions, apart from late velocities
 PLUS = "(-?[0-9.]+) \N{PLUS-MINUS SIGN} ([0-9.]+)"
 FAULTS = (
     Fault(name="untouched"),

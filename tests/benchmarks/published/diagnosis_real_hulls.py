@@ -27,8 +27,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from real_data_cases import POND, TANK, Case, vessel_of
 
-PACE_S = 0.5
-"""Time between samples after averaging: the ships need seconds for anything they do."""
+PACE_S = 0.5  # time between samples after averaging: the ships need seconds for anything they do
 LONGEST_S, JUDGED_S = 300.0, 200.0
 """Length that every run is cut to, and every one with a fault, to keep the studies short."""
 WINDY = ("random", "turn_14", "zigzag")

@@ -43,8 +43,7 @@ from real_data_cases import POND, TANK, Case, vessel_of
 AHEAD_S, HORIZONS_S, MEAN_S, STEP_S = 30.0, (5.0, 10.0, 30.0), 0.5, 0.5
 FIXED_S = (10.0, 30.0)
 """Of predictions, of the baseline's simulations, of its averages, and of the integrator, at most [s]."""
-MOST = 10.0
-"""Largest error over a standard deviation that counts."""
+MOST = 10.0  # largest error over a standard deviation that counts
 Model = dict[str, float]
 
 

@@ -70,12 +70,10 @@ ESTIMATORS = {
     "IV3": "iv-wind",
 }
 EQUATIONS = {"X": "surge", "Y": "sway", "N": "yaw"}
-CONSISTENT = 1.0
-"""Mean error over standard deviation below which an estimator counts as consistent, as in the source."""
+CONSISTENT = 1.0  # mean error over standard deviation below which an estimator counts as consistent, as in the source
 
 
-DISTURBANCE_STD_MPS = 1e-3**0.5
-"""Of current and wind, each component, from sample to sample."""
+DISTURBANCE_STD_MPS = 1e-3**0.5  # of current and wind, each component, from sample to sample
 CURRENT_TO = (0.2, -0.2)
 MARGIN_MPS = float(np.hypot(*CURRENT_TO)) + 3.0 * DISTURBANCE_STD_MPS
 """The bound on u and v in (5.77); that of the noise, three of its standard deviations, is lower."""

@@ -38,8 +38,7 @@ from yaw_detector import Detector, alarm_samples, excitation_rank
 
 EVERY, PRIORS = 4, 5
 FULL = YAW_MODELS["full"]
-MEETS, WATCHED = "meet_the_thesis", "are_watched"
-"""Ends of names of tests."""
+MEETS, WATCHED = "meet_the_thesis", "are_watched"  # ends of names of tests
 EXCITATIONS = {"calm": CALM, "brisk": BRISK}
 CONSTANTS = {
     ("full", "true"): Detector(d=0.0025, l=2.8e-5, h=0.022),

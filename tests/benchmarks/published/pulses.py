@@ -19,10 +19,8 @@ from expdesign.simulation import simulate_ensemble
 from expdesign.values import Array
 from expdesign.vessel import Environment, Sensors, Vessel
 
-STRETCH = 100
-"""Samples drawn at once."""
-DRAWS = 24
-"""Stretches drawn and simulated side by side."""
+STRETCH = 100  # samples drawn at once
+DRAWS = 24  # stretches drawn and simulated side by side
 MOST_ATTEMPTS = 2000
 WINDOW = np.hanning(9)[1:-1] / np.hanning(9).sum()
 

@@ -25,8 +25,7 @@ from expdesign.values import Array
 
 TRUTH = np.array([-0.1, 1.0])
 NAMES = ("n", "f")
-REFINEMENTS = 8
-"""More do not change the tables: the estimate settles within three or four."""
+REFINEMENTS = 8  # more do not change the tables: the estimate settles within three or four
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,7 @@ import scipy
 from expdesign.step_trials.responses import Transient, first_order, fit_first_order, second_order
 from expdesign.step_trials.samples import modified_scores
 
-PER_S = (0.1, 0.5, 1.0)
-"""l1, l2, l3 over the time between samples, of the speed over ground in the published trial."""
+PER_S = (0.1, 0.5, 1.0)  # l1, l2, l3 over the time between samples, of the speed over ground in the published trial
 CORRELATIONS_S = (0.0, 0.5, 2.0, 10.0)
 RATIOS = {
     0.01: (1, 45, 134, 490),
