@@ -16,7 +16,7 @@ FLOORS = {
         ("errors", "interruptions", "lazy", "progress", "threads"),
         ("input_files", "processes", "requests"),
         ("memory",),
-        ("conventions", "values"),
+        ("conventions", "saved", "values"),
         ("signals", "sea_area", "waves"),
         ("vessel",),
         ("simulation", "records"),

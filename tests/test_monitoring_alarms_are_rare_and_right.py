@@ -25,9 +25,6 @@ from expdesign.monitoring import (
     calibrate,
     calls_of,
     cusum,
-    restored_calibration,
-    restored_state,
-    saved,
     threshold,
     watch,
 )
@@ -35,6 +32,7 @@ from expdesign.monitoring.alarms import beside_baseline
 from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE
 from expdesign.monitoring.force import Force
 from expdesign.monitoring.rolled import RollEvent
+from expdesign.saved import restored, saved
 from monitoring_case import CHANGES, FORCES, STRETCH_S, content_of, drawn_columns, drawn_grams, grams_from, watched
 
 NOISE = np.array([1.0, np.inf, np.inf, np.inf])
@@ -93,10 +91,10 @@ def test_a_watch_in_parts_and_out_of_a_file_is_the_same_to_the_last_bit(calibrat
     whole = watched(calibration, grams, limit)
     state = State.begun(calibration, time_s=0.0)
     alarms: list[Alarm] = []
-    again = restored_calibration(json.loads(json.dumps(saved(calibration))))
+    again = restored(Calibration, json.loads(json.dumps(saved(calibration))))
     for first in range(0, 120, 7):
         state, more, _ = watched(again, grams.part(slice(first, first + 7)), limit, state)
-        state = restored_state(json.loads(json.dumps(saved(state))))
+        state = restored(State, json.loads(json.dumps(saved(state))))
         alarms += more
     assert saved(state) == saved(whole[0])
     assert tuple(alarms) == whole[1]

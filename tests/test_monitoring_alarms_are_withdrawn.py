@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from expdesign.export.monitor_content import MonitorContent, monitor_json, sentences
-from expdesign.monitoring import Calibration, calibrate, restored_state, saved, threshold
+from expdesign.monitoring import Calibration, State, calibrate, threshold
+from expdesign.saved import restored, saved
 from monitoring_case import CHANGES, STRETCH_S, content_of, drawn_columns, drawn_grams, grams_from, watched
 
 LIMIT = threshold(CHANGES, 1e4)
@@ -70,5 +71,5 @@ def test_after_it_is_withdrawn_the_watch_goes_on_from_the_ship_before(calibratio
         assert later.change == 3
         assert abs(later.value - 1.0) < 4.0 * later.std
         assert np.abs(np.delete(state.shift, 3)).max() < 0.2
-        assert json.dumps(saved(restored_state(json.loads(json.dumps(saved(state)))))) == json.dumps(saved(state))
+        assert json.dumps(saved(restored(State, json.loads(json.dumps(saved(state)))))) == json.dumps(saved(state))
     assert found >= 8

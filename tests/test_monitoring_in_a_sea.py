@@ -28,8 +28,6 @@ from expdesign.monitoring import (
     grams_and_noise,
     grams_of,
     later_part,
-    restored_alarm,
-    saved,
     stretch_length,
     threshold,
     watch,
@@ -38,6 +36,7 @@ from expdesign.monitoring import (
 )
 from expdesign.monitoring.evidence import STARTS
 from expdesign.monitoring.noise import whitened
+from expdesign.saved import restored, saved
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
@@ -227,7 +226,7 @@ def test_wind_that_turns_her_is_named_beside_the_change_that_it_looks_like(
     assert state.alarm is not None
     assert changes[state.alarm.change].effect == "offset:rudder"
     assert [axis for axis, _ in state.alarm.pushes] == [2]
-    assert restored_alarm(json.loads(json.dumps(saved(state.alarm)))) == state.alarm
+    assert restored(Alarm, json.loads(json.dumps(saved(state.alarm)))) == state.alarm
 
 
 @pytest.mark.slow

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from expdesign.monitoring import RollWatch, restored_roll, roll_learnt, roll_watched, saved
+from expdesign.monitoring import RollWatch, roll_learnt, roll_watched
 from expdesign.roll import Run
+from expdesign.saved import restored, saved
 from expdesign.vessel import NOMINAL, Load
 from expdesign.workflows import monitor
 from expdesign.workflows.steps.watching import DAY
@@ -43,7 +44,7 @@ def watched(pieces: list[tuple[str, Load, int]], *, called: int | None = None, m
             now, SHIP, [piece(ship, load, seed)], begin_s=number * PIECE_S, end_s=(number + 1) * PIECE_S,
             mean_time_s=mean_days * DAY, called=number == called,
         )  # fmt: skip
-        now = restored_roll(json.loads(json.dumps(saved(now))))
+        now = restored(RollWatch, json.loads(json.dumps(saved(now))))
     return now
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.monitoring import saved
 from expdesign.records import read_levels
+from expdesign.saved import restored, saved
 from expdesign.step_trials import controls_of, levels_of
-from expdesign.step_trials.live import Row, State, after_row, beginning, restored_state, step_list
+from expdesign.step_trials.live import Row, State, after_row, beginning, step_list
 from expdesign.step_trials.live.watch import still_to_come
 from expdesign.workflows.steps.step_list import listed_steps
 from export_case import plan, plan_files
@@ -107,7 +107,7 @@ def test_the_state_goes_through_a_file_to_the_last_bit() -> None:
 
     half = len(crew.rows) // 2
     once = after(crew.rows, beginning(setup))
-    broken = restored_state(json.loads(json.dumps(saved(after(crew.rows[:half], beginning(setup))))))
+    broken = restored(State, json.loads(json.dumps(saved(after(crew.rows[:half], beginning(setup))))))
     assert saved(after(crew.rows[half:], broken)) == saved(once)
 
 

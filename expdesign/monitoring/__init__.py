@@ -19,13 +19,5 @@ from expdesign.monitoring.changes import EQUATIONS, Change, watched_changes, wat
 from expdesign.monitoring.cusum import calls_of, estimates, soonest, threshold, watch
 from expdesign.monitoring.evidence import KINDS, Grams, grams_and_noise, grams_of, joined, later_part, stretch_length
 from expdesign.monitoring.noise import WHITE, Noise
-from expdesign.monitoring.rolled import RollEvent, RollWatch, restored_roll, roll_learnt, roll_watched
-from expdesign.monitoring.saved import (
-    restored_alarm,
-    restored_calibration,
-    restored_changes,
-    restored_noise,
-    restored_state,
-    saved,
-)
+from expdesign.monitoring.rolled import RollEvent, RollWatch, roll_learnt, roll_watched
 from expdesign.monitoring.state import Alarm, Call, Rules, State, Step

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -178,17 +177,3 @@ def _pendulum(ship: Vessel) -> RollPendulum:
 
 def _duration(runs: Sequence[Run]) -> float:
     return sum(len(run.signals) * run.step_s for run in runs)
-
-
-def restored_roll(table: dict[str, Any]) -> RollWatch:
-    """A watch of roll, read from what `saved` made of it."""
-    arrays = {name: None if table[name] is None else np.array(table[name], float) for name in ("mean", "covariance")}
-    events = tuple(RollEvent(**_event_values(event)) for event in table["events"])
-    return RollWatch(**{**table, **arrays, "free": tuple(table["free"]), "events": events})
-
-
-def _event_values(table: dict[str, Any]) -> dict[str, Any]:
-    lists = {name: tuple(table[name]) for name in ("causes", "sizes", "stds")}
-    pair = tuple(float(value) for value in table["righting_nm"])
-    load = None if table["load"] is None else tuple(table["load"])
-    return {**table, **lists, "righting_nm": pair, "load": load, "others": tuple(map(tuple, table["others"]))}

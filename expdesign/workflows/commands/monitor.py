@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,31 +15,22 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import InputError, NotInformative
 from expdesign.export.folder import Content, write_files
-from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json
+from expdesign.export.monitor_content import MonitorContent, monitor_json
 from expdesign.export.monitor_page import budget_entries, monitor_document
 from expdesign.export.pages import document_html
 from expdesign.export.words import counted
-from expdesign.monitoring import (
-    RollWatch,
-    restored_alarm,
-    restored_calibration,
-    restored_changes,
-    restored_noise,
-    restored_roll,
-    restored_state,
-    saved,
-)
+from expdesign.monitoring import RollWatch
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
-from expdesign.records import STREAM, Taken, pieces
+from expdesign.records import STREAM, pieces
 from expdesign.requests import repeating
+from expdesign.saved import restored, saved
 from expdesign.workflows.outcome import Outcome, finished, left_state, shared, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
-from expdesign.workflows.steps.watched_ship import Asked, Late, Read, prepared, unread
+from expdesign.workflows.steps.watched_ship import Asked, Read, prepared, unread
 from expdesign.workflows.steps.watching import (
     HOUR,
     Learning,
-    Reading,
     Ready,
     Watch,
     Watching,
@@ -50,62 +41,6 @@ from expdesign.workflows.steps.watching import (
     with_piece,
     with_reference,
 )
-
-
-def restored_watch(table: Mapping[str, Any]) -> Watch:
-    """A watch, read from what `saved` made of it.
-
-    Raises:
-        KeyError, TypeError, ValueError, AttributeError: it is none.
-    """
-    return Watch(
-        changes=restored_changes(table["changes"]),
-        noise=restored_noise(table["noise"]),
-        reading=_reading(table["reading"]),
-        phase=_phase(table["phase"]),
-        roll=restored_roll(table["roll"]),
-        late=tuple(map(_late, table["late"])),
-    )
-
-
-def _late(table: Mapping[str, Any]) -> Late:
-    noise, time_s = restored_noise(table["noise"]), np.array(table["time_s"], float)
-    return Late(text=table["text"], time_s=time_s, offset_s=float(table["offset_s"]), noise=noise)
-
-
-def _phase(table: Mapping[str, Any]) -> Learning | Ready | Watching:
-    if "state" in table:
-        return _watching(table)
-    if "calibration" in table:
-        return Ready(calibration=restored_calibration(table["calibration"]), reference_s=table["reference_s"])
-    return Learning()
-
-
-def _reading(table: Mapping[str, Any]) -> Reading:
-    return Reading(
-        **{
-            **table,
-            "now_s": float(table["now_s"]),
-            "notes": tuple(table["notes"]),
-            "pending": tuple(table["pending"]),
-            "taken": tuple(Taken(**{**taken, "last_s": float(taken["last_s"])}) for taken in table["taken"]),
-        }
-    )
-
-
-def _watching(table: Mapping[str, Any]) -> Watching:
-    return Watching(
-        calibration=restored_calibration(table["calibration"]),
-        reference_s=table["reference_s"],
-        state=restored_state(table["state"]),
-        alarms=tuple(map(restored_alarm, table["alarms"])),
-        moments=tuple(
-            Moment(**{**m, "value": np.array(m["value"], float), "std": np.array(m["std"], float)})
-            for m in table["moments"]
-        ),
-        changed=tuple(table["changed"]),
-    )
-
 
 STATE, SINCE_CHANGE = "monitor-state.json", "since-change.csv"
 MOST_ROWS = 20_000  # largest number of rows in a piece of a file
@@ -276,10 +211,10 @@ def _resumed(path: Path, asked: Asked) -> Watch:
         InputError: it was begun with other options.
     """
 
-    def restored(table: dict[str, Any]) -> tuple[Watch, dict[str, float]]:
-        return restored_watch(table), {name: float(table["options"][name]) for name in _kept(asked)}
+    def from_table(table: dict[str, Any]) -> tuple[Watch, dict[str, float]]:
+        return restored(Watch, table), {name: float(table["options"][name]) for name in _kept(asked)}
 
-    now, begun = left_state(path, restored)
+    now, begun = left_state(path, from_table)
     for name, value in _kept(asked).items():
         if begun[name] != value:
             raise InputError(f"{name} is {value:g}, but the watch was begun with {begun[name]:g}; expected the same")

@@ -26,12 +26,12 @@ from expdesign.export.step_trial_page import (
     to_do_csv,
     to_do_table,
 )
-from expdesign.monitoring import saved
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Piece, Taken, pieces
 from expdesign.records.file import Inputs, Table, choose_columns
 from expdesign.records.load import check_limits, column_limits
 from expdesign.requests import repeating
+from expdesign.saved import restored, saved
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
     Row,
@@ -41,7 +41,6 @@ from expdesign.step_trials.live import (
     after_row,
     beginning,
     expected_constants,
-    restored_state,
 )
 from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.workflows.outcome import Outcome, Told, finished, left_state, silently, workflow
@@ -243,17 +242,12 @@ def _resumed(path: Path, steps: StepList) -> _Watch:
         FileError: there is none, or it is of another kind, version or list.
     """
 
-    def restored(table: dict[str, Any]) -> _Watch:
+    def from_table(table: dict[str, Any]) -> _Watch:
         if table["steps"] != json.loads(json.dumps(saved(steps))):
             raise FileError(path, "steps", "are of another list, expected that of --steps")
-        return _Watch(
-            state=restored_state(table["state"]),
-            taken=tuple(Taken(**{**taken, "last_s": float(taken["last_s"])}) for taken in table["taken"]),
-            notes=tuple(table["notes"]),
-            events=table["events"],
-        )
+        return restored(_Watch, table)
 
-    return left_state(path, restored)
+    return left_state(path, from_table)
 
 
 def _document(content: LiveContent) -> Document:
