@@ -8,9 +8,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from expdesign.export import words
-from expdesign.export.files import strict_json
+from expdesign.export.files import finite, strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
+from expdesign.particulars import Expected
 from expdesign.vessel import Vessel
 
 KINDS = {Circle: "turning circle", ZigZag: "zig-zag", Stop: "stopping", NotStandard: "no standard trial"}
@@ -34,6 +35,8 @@ class IndicesContent:
     depth_m: float | None = None
     wind_mps: float | None = None
     sea_state: int | None = None
+    # results of ships that the vessel file's standard deviations allow, of the model's trials; none where it has none
+    expected: tuple[Expected, ...] = ()
 
     @property
     def trials(self) -> tuple[tuple[str, Circle | ZigZag | Stop], ...]:
@@ -129,6 +132,42 @@ def verdict_rows(content: IndicesContent) -> list[tuple[str, ...]]:
     return rows
 
 
+@dataclass(frozen=True, kw_only=True)
+class Interval:
+    """A simulated result with its 95 % interval."""
+
+    run: str
+    quantity: str
+    value: float
+    low: float
+    high: float  # infinite where some ships do not come to the end of the trial
+
+
+def intervals(content: IndicesContent) -> tuple[Interval, ...]:
+    """Of the simulated results: as wide, in shares of the result, as those of the ships that the file allows."""
+    found = []
+    for trial in content.simulated.trials if content.simulated else ():
+        for one in content.expected:
+            value = _result(trial, one)
+            if value is None or value <= 0 or not math.isfinite(one.value):
+                continue
+            low, high = (value / one.value * end for end in (one.low, one.high))
+            found.append(Interval(run=trial.name, quantity=one.quantity, value=value, low=low, high=high))
+    return tuple(found)
+
+
+def _result(trial: Circle | ZigZag | Stop, one: Expected) -> float | None:
+    """What a trial shows of an expected result, None where that is of another trial."""
+    results: dict[str, float | None] = {}
+    if isinstance(trial, Circle) and one.trial.kind == "circle":
+        results = {name: getattr(trial, name) for name in ("advance_m", "transfer_m", "tactical_diameter_m")}
+    elif isinstance(trial, ZigZag) and math.isclose(trial.heading_rad, one.trial.angle_rad):
+        results = {f"overshoot_{number}_rad": value for number, value in enumerate(trial.overshoots_rad, start=1)}
+    elif isinstance(trial, Stop) and one.trial.kind == "stop":
+        results = {"reach_m": trial.track_reach_m, "time_s": trial.time_s}
+    return results.get(one.quantity)
+
+
 def overshoots(trial: ZigZag) -> str:
     """All of them, and the largest tolerance [deg]."""
     reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
@@ -180,6 +219,7 @@ def _simulated(content: IndicesContent) -> dict[str, Any]:
         "speed_mps": found.speed_mps,
         "helm": found.helm,
         "trials": [_trial(trial) for trial in found.trials],
+        "intervals_95": [asdict(one) | {"high": finite(one.high)} for one in intervals(content)],
         "not_run": list(found.not_run),
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from itertools import zip_longest
 
@@ -9,7 +10,16 @@ from markupsafe import Markup
 
 from expdesign.export import words
 from expdesign.export.document import Document, Items, Section, Table, filled, notes_of, section, verdict
-from expdesign.export.indices_form import IndicesContent, degrees, overshoots, shown, verdict_rows, verdict_word
+from expdesign.export.indices_form import (
+    IndicesContent,
+    degrees,
+    intervals,
+    overshoots,
+    shown,
+    verdict_rows,
+    verdict_word,
+)
+from expdesign.export.nominal_page import RESULTS
 from expdesign.export.words import speed
 from expdesign.indices import (
     DEPTH_BY_DRAUGHT,
@@ -22,6 +32,7 @@ from expdesign.indices import (
     ZigZag,
     beaufort,
 )
+from expdesign.particulars import shown as in_mariners_units
 
 # The reporting form: ship, conditions, and results to port and to starboard beside the criterion.
 #
@@ -67,6 +78,12 @@ ZIGZAGS = (
 STOPS = (
     "From", "Run", "Approach", "Track reach", "Head reach", "To starboard", "Change of heading [°]", "Time [s]",
 )  # fmt: skip
+SURE = ("Simulated run", "Result", "Simulated", "95 % from", "To")
+SURENESS = (
+    "Of 100 trials of ships that the vessel file's standard deviations allow, 95 lie within. Repeated trials scatter, "
+    "and a model of second order misses them: 6 % of an advance or tactical diameter and a fifth of an overshoot count "
+    "as standard deviations. \u201cNo end\u201d: some of these ships do not come to the end of the trial."
+)
 DEFINITIONS = (
     "Advance, transfer and tactical diameter refer to the midship point. They are measured from the rudder order, "
     "along and across the approach heading.",
@@ -114,6 +131,9 @@ def indices_document(content: IndicesContent) -> Document:
             section("Turning circles", Table(header=CIRCLES, rows=_circles(content), texts=4, on="page")),
             section("Zig-zags", Table(header=ZIGZAGS, rows=_zigzags(content), texts=6)),
             section("Stopping", Table(header=STOPS, rows=_stops(content), texts=3, on="page")),
+            section(
+                "How sure the simulated results are", Table(header=SURE, rows=sure_rows(content), texts=2), SURENESS
+            ),
             *(
                 [section("Missing results and remarks", *notes_of(content.notes_in_words))]
                 if content.notes_in_words
@@ -122,6 +142,18 @@ def indices_document(content: IndicesContent) -> Document:
             section("Definitions", Items(DEFINITIONS)),
         ),
     )
+
+
+def sure_rows(content: IndicesContent) -> list[tuple[str, ...]]:
+    """Simulated results with their intervals."""
+
+    def told(quantity: str, value: float) -> str:
+        return in_mariners_units(quantity, value) if math.isfinite(value) else "no end"
+
+    return [
+        (one.run, RESULTS[one.quantity], *(told(one.quantity, end) for end in (one.value, one.low, one.high)))
+        for one in intervals(content)
+    ]
 
 
 def _verdicts(content: IndicesContent) -> Section:

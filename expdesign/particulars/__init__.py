@@ -19,5 +19,6 @@ if TYPE_CHECKING:
     )
     from expdesign.particulars.fit import Found, Nominal, Predicted, nominal, shown
     from expdesign.particulars.hull import FACTORS, is_usual
+    from expdesign.particulars.intervals import Expected, expected, standard_trials
 else:
     __getattr__, __all__ = load_on_use(__name__, __file__)

@@ -21,6 +21,7 @@ import scipy
 from expdesign.particulars.card import SCATTER, Card, Stated, Trial
 from expdesign.particulars.forces import EFFICIENCY, Propeller, design_speed, propellers
 from expdesign.particulars.hull import BEYOND, FACTORS, factors, is_usual, resistance, scatter
+from expdesign.particulars.intervals import DRAWS, Expected, interval
 from expdesign.particulars.model import OWN_SCATTER, parameters, vessel_of, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.progress import Progress, silent
@@ -30,7 +31,6 @@ from expdesign.vessel import Vessel
 STEP = 0.05  # change of an unknown for its derivative
 MOST_FITS = 25
 DOUBTFUL = 3.0  # standard deviations from what all other values say, from which a value contradicts them
-DRAWS = 240  # ships that are drawn for the intervals of predictions
 SAME_SPEED = 0.03  # share within which two speeds or orders count as one
 NEAR_SPEED = 0.10  # share within which a standard trial is left out beside a stated one
 KINDS = ("speed", "circle", "zigzag", "stop", "spin", "drift")
@@ -39,14 +39,9 @@ PITCH = (0.45, 1.55)  # pitch ratios that propellers have
 
 
 @dataclass(frozen=True, kw_only=True)
-class Predicted:
-    """A quantity of a trial with its 95 % interval, beside what the card states."""
+class Predicted(Expected):
+    """An expected result beside what the card states."""
 
-    trial: Trial
-    quantity: str
-    value: float  # infinite, as the others, where the trial has no end
-    low: float
-    high: float
     prior: float  # from particulars alone
     stated: tuple[Stated, ...] = ()
 
@@ -287,11 +282,9 @@ def _predicted(
     """Of the ship from particulars alone, the fitted one, then drawn ones; a trial without end counts as endless."""
     for quantity, values in fleet.results(trial).items():
         before, value, *drawn = np.nan_to_num(values, nan=math.inf).tolist()
-        noise = problem.scatter_of(quantity) * rng.standard_normal(len(drawn))
-        shows = drawn * np.exp(noise)
-        low, high = np.quantile(shows, [0.025, 0.975], method="inverted_cdf").tolist()
+        low, high = interval(value, np.array(drawn), problem.scatter_of(quantity), rng)
         yield Predicted(
-            trial=trial, quantity=quantity, value=value, low=min(low, value), high=max(high, value), prior=before,
+            trial=trial, quantity=quantity, value=value, low=low, high=high, prior=before,
             stated=tuple(one for one in stated if one.trial == trial and one.quantity == quantity),
         )  # fmt: skip
 

@@ -34,9 +34,8 @@ from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.errors import InputError
 from expdesign.export.files import vessel_toml
 from expdesign.export.folder import write_files
-from expdesign.particulars import Stated
+from expdesign.particulars import Stated, expected
 from expdesign.particulars.forces import design_speed
-from expdesign.particulars.trials import Fleet
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.simulation import steady_ahead
 from expdesign.vessel import Sensors, Vessel, VesselModel
@@ -47,7 +46,6 @@ SHIPS = MODELS | {
     "kcs-model": lambda: published.froude(published.kcs(), 1.0 / 75.5),
     "esso-osaka": lambda: published.froude(published.esso_osaka(), 325.0 / 3.0),
 }
-DRAWS = 300
 METHODS = ("ls", "iv", "oe")
 STEPS = 10  # of the published model in a sample
 
@@ -174,17 +172,13 @@ def stepped(model: published.Model, state: np.ndarray, angle: float, order: floa
 
 
 def deviations(vessel: Vessel, values: Iterable[Stated]) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithms of predicted by true values, and whether the true ones lie in 95 % intervals of drawn vessels."""
-    drawn = vessel.model.drawn_parameters(DRAWS, np.random.default_rng(0))
-    fleet = Fleet(vessel, np.vstack([vessel.model.parameters, drawn]), fastest_mps=30.0)
-    errors, inside = [], []
-    results = {trial: fleet.results(trial) for trial in dict.fromkeys(one.trial for one in values)}
-    for one in values:
-        found = results[one.trial].get(one.quantity, np.full(DRAWS + 1, np.nan))
-        low, high = np.nanquantile(np.where(np.isnan(found[1:]), np.inf, found[1:]), [0.025, 0.975])
-        errors.append(math.log(found[0] / one.value) if np.isfinite(found[0]) and found[0] > 0 else math.inf)
-        inside.append(low <= one.value <= high)
-    return np.array(errors), np.array(inside)
+    """Logarithms of predicted by true values, and whether the true ones lie in the 95 % intervals of `indices`."""
+    by_key = {
+        (one.trial, one.quantity): one for one in expected(vessel, dict.fromkeys(value.trial for value in values))
+    }
+    found = [(by_key[value.trial, value.quantity], value.value) for value in values]
+    errors = [math.log(one.value / value) if 0 < one.value < math.inf else math.inf for one, value in found]
+    return np.array(errors), np.array([one.low <= value <= one.high for one, value in found])
 
 
 def outcome(

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign import requests
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NoAnswer
 from expdesign.export.indices_form import IndicesContent, indices_json
 from expdesign.export.indices_page import indices_document
 from expdesign.indices import StandardResults, measured_trial, standard_results
 from expdesign.indices.measured import Found
+from expdesign.particulars import Expected, expected, standard_trials
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
 from expdesign.vessel import Vessel
@@ -35,6 +36,7 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
         scale=request.scale,
         simulated=found,
         simulated_why_not=why_not,
+        expected=_expected(ship, found),
         measured=seen,
         notes=(*told, *notes),
         depth_m=request.depth_m,
@@ -85,3 +87,13 @@ def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[
         if needed:
             raise
         return None, str(error)
+
+
+def _expected(ship: Vessel, found: StandardResults | None) -> tuple[Expected, ...]:
+    """What ships do that the vessel file's standard deviations allow, where it states some."""
+    if found is None or not found.circles or not ship.model.parameter_std.any():
+        return ()
+    try:
+        return expected(ship, standard_trials(found.speed_mps, stops=bool(found.stops)))
+    except (InputError, NoAnswer):  # hardly any such ship is within its ranges
+        return ()
