@@ -19,9 +19,17 @@ from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain, judged
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
 from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
+from expdesign.diagnosis.select.fitted_candidate import Rival
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, to_take_out
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection import Step, insignificant_steps, wald_p_value, without_step
+from expdesign.diagnosis.select.selection import (
+    Selection,
+    Step,
+    insignificant_steps,
+    wald_p_value,
+    with_alternatives_beside_all,
+    without_step,
+)
 from expdesign.diagnosis.select.selection_round import (
     Work,
     selection_round,
@@ -184,6 +192,35 @@ def test_a_cause_of_size_zero_is_taken_out_and_the_rest_is_estimated_anew(barge)
         assert rest.before is before
         assert rest.chosen.fit.value("gain") == pytest.approx(alone.chosen.fit.value("gain"), abs=1e-3)
         assert insignificant_steps(with_p_values([rest], rest.chosen.fit)) == []
+
+
+def test_an_alternative_has_to_explain_as_much_beside_all_other_causes():
+    """Cubic damping is one to a current as long as quadratic damping is missing; another form of the current stays."""
+    record = hidden_record("tug", seed=45, batches=3, samples=150, current=(0.3, -0.2))
+    vessel = vessel_of("tug", without=("Y_abs_v_v",))
+    ship = extended_model(vessel, record)
+    windows = cut_windows(ship.model, record)
+    flow = Candidate(cause="current", free={"current:north": 0.0, "current:east": 0.0})
+    cubic = Candidate(cause="missing_term:Y_vvv", free={"term:Y_vvv": 0.0})
+    drag = Candidate(cause="missing_term:Y_abs_v_v", free={"term:Y_abs_v_v": 0.0})
+    before = fit(ship, windows, (), starts=initial_states(windows))
+    first = added(before, windows, flow)
+    rivals = tuple(
+        Rival(candidate=replace(one, cause=f"{one.cause}, too"), ship=added(before, windows, one).chosen.fit.ship,
+              trails_by=0.0)
+        for one in (flow, cubic, drag)
+    )  # fmt: skip
+    first = replace(first, alternatives=rivals)
+    second = added(first.chosen.fit, windows, drag)
+    found = Selection(
+        steps=(first, replace(second, alternatives=rivals[:1])), first=before, last=second.chosen.fit, last_tests=()
+    )
+    judged, last = with_alternatives_beside_all(found, windows).steps
+    (left,) = judged.alternatives
+    assert left.candidate.cause == "current, too"
+    assert left.trails_by < 1.0
+    assert left.ship.get("term:Y_abs_v_v") == pytest.approx(found.last.value("term:Y_abs_v_v"), rel=0.01)
+    assert last.alternatives == rivals[:1]  # nothing was found after it
 
 
 def test_runs_held_out_do_not_influence_the_estimates_they_validate(barge):

@@ -43,6 +43,7 @@ from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
 from expdesign.diagnosis.fit import (
     CrossValidation,
+    Fit,
     HeldOut,
     held_out_gain,
     judged,
@@ -394,17 +395,17 @@ def _findings(chosen: Selected, windows: Windows, proposals: Sequence[Proposal],
     before = [chosen.compared_with(seed)[0], *chosen.held[1:]] if kept.steps else []
     found = [(step, (before[index], chosen.held[index + 1])) for index, step in enumerate(kept.steps)]
     found += [] if wrong is None else [(wrong.step, (chosen.before, wrong.alone))]
+    tells = [_discriminating(step, kept.last, proposals, windows) for step, _ in found]
     return tuple(
-        finding_of(step, kept.last, pair, seed, windows, would_tell_apart=_discriminating(step, proposals, windows))
-        for step, pair in found
+        finding_of(step, kept.last, pair, seed, windows, would_tell_apart=manoeuvre)
+        for (step, pair), manoeuvre in zip(found, tells, strict=True)
     )
 
 
-def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows) -> str | None:
+def _discriminating(step: Step, found: Fit, proposals: Sequence[Proposal], windows: Windows) -> str | None:
     """The manoeuvre that distinguishes a cause from its alternatives best; None where there are none."""
     if not step.alternatives:
         return None
-    found = step.chosen.fit
     std = np.where(np.isfinite(found.noise.std), found.noise.std, np.inf)
     return most_discriminating(found.ship, [other.ship for other in step.alternatives], proposals, std, windows)
 

@@ -244,12 +244,17 @@ def _stretches(found: Diagnosis) -> Iterator[Figure]:
 
 def _tested(found: Diagnosis) -> Section:
     above = " with the findings above in the model" if found.findings else ""
+    other = " other" if found.findings else ""
+    of_two = (
+        " Of two runs, one beside others also stays where simulations of held-out data are certainly worse without it."
+        if len(found.record.batches) == 2
+        else ""
+    )
     return section(
-        "Other causes that were tested",
-        f"p-values of all other causes{above}, corrected for the number of tests. 1 means no evidence. A cause becomes "
-        f"a finding if its p-value after the fit is at most {SELECTION_TUNING.accepted_p_value:g} and adding it "
-        f"reduces an error of held-out {found.unit} by an interval that excludes zero. Of two runs, one beside others "
-        "also stays where simulations of held-out data are worse without it for certain.",
+        f"{other} causes that were tested".strip().capitalize(),
+        f"p-values of all{other} causes{above}, corrected for the number of tests. 1 means no evidence. A cause "
+        f"becomes a finding if its p-value after the fit is at most {SELECTION_TUNING.accepted_p_value:g} and adding "
+        f"it reduces an error of held-out {found.unit} by an interval that excludes zero.{of_two}",
         Table(
             header=("Cause", "p-value"),
             rows=[(cause_title(cause), f"{p_value:.2g}") for cause, p_value in found.screened],
@@ -328,6 +333,10 @@ def _finding(found: Diagnosis, index: int) -> Section:
             f"Gain of fit, mean of {', '.join(found.before.outputs)}",
             f"{words.number(item.gain, 1)} points\n95{nb}% interval {words.number(low, 1)} to {words.number(high, 1)}",
         ),
+        (
+            f"Squared error of predictions from sample to sample, 95{nb}% interval",
+            "" if item.predicted is None else f"less by {_share(item.predicted)}",
+        ),
     ]
     force, signed = is_force(found, item), has_sign(item)
     what = "Missing acceleration" if force else "Measured minus simulated"
@@ -356,7 +365,7 @@ def _alternatives(item: Finding) -> str:
     if item.would_tell_apart is None:
         return text
     return text + Markup(
-        " To distinguish them, run <b>{}</b>. The explanations disagree most there, per minute."
+        " To distinguish them, sail <b>{}</b>. The explanations disagree most there, per minute."
     ).format(manoeuvre(item.would_tell_apart))
 
 
@@ -369,8 +378,12 @@ def _says(item: Estimate) -> str:
 
 
 def _reduction(item: ErrorReduction) -> str:
+    return f"{item.output} {_share(item)}"
+
+
+def _share(item: ErrorReduction) -> str:
     shares = (words.number(100 * value, 0) for value in (item.share, item.low, item.high))
-    return "{} {}{nb}% ({} to {}{nb}%)".format(item.output, *shares, nb=words.NB)
+    return "{}{nb}% ({} to {}{nb}%)".format(*shares, nb=words.NB)
 
 
 def _fit(value: float) -> str:

@@ -24,6 +24,7 @@ from expdesign.diagnosis.select.selection import (
     Selection,
     Step,
     insignificant_steps,
+    with_alternatives_beside_all,
     with_runs_counted,
     without_step,
 )
@@ -65,14 +66,14 @@ def eliminate_backward(
         for index in insignificant_steps(counted.steps):
             others = without_step(list(whole.steps), index, windows)
             if others is None:
-                return counted, held
+                return with_alternatives_beside_all(counted, windows), held
             found = whole.with_steps(tuple(others))
             if not (
                 _may_be_needed(index, counted, windows) and _is_needed(counted, held, cross_validated(found)[1], seed)
             ):
                 break
         else:
-            return counted, held
+            return with_alternatives_beside_all(counted, windows), held
 
 
 def _may_be_needed(index: int, found: Selection, windows: Windows) -> bool:

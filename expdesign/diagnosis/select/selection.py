@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from expdesign.diagnosis.fit import (
     NOISE_ALONE,
     Dispersion,
     Fit,
+    FitOptions,
     continuing,
     counting_runs,
     few_runs_factor,
@@ -153,6 +154,41 @@ def with_runs_counted(found: Selection, candidates: Sequence[Candidate], rng: np
 def _equivalent(rivals: Sequence[Rival], known: Dispersion) -> tuple[Rival, ...]:
     """Those that the data cannot tell from the chosen candidate: where runs differ, likelihoods decide by less."""
     return tuple(rival for rival in rivals if rival.trails_by < TUNING.equivalent_within * known.alone[0])
+
+
+def with_alternatives_beside_all(found: Selection, windows: Windows) -> Selection:
+    """The selection whose alternatives explain the data as well beside all other causes.
+
+    They did beside those that were found before. What was missing then an alternative may have imitated.
+    """
+    steps = [
+        replace(step, alternatives=tuple(_beside_all(step, found, windows))) if step.alternatives else step
+        for step in found.steps[:-1]
+    ]
+    return replace(found, steps=(*steps, *found.steps[-1:]))
+
+
+def _beside_all(step: Step, found: Selection, windows: Windows) -> Iterator[Rival]:
+    """Alternatives as likely as a step, all other causes estimated again, and those that cannot be fitted so."""
+    last, own = found.last, _own_effects(step)
+    others = [key for key in last.free_keys if key not in own]
+    for rival in step.alternatives:
+        candidate = rival.candidate
+        more = {key: rival.ship.get(key) for key in (*candidate.free, *candidate.fixed) if key not in others}
+        estimated = [key for key in candidate.free if key in more and key != (candidate.grid or ("",))[0]]
+        ship = last.ship.without_effects(own).with_effects(more)
+        try:
+            fits = [
+                fit(ship, windows, (*others, *estimated), starts=last.starts, options=options)
+                for options in (continuing(last), FitOptions(warm_start=last))
+            ]
+        except (FloatingPointError, np.linalg.LinAlgError):
+            yield rival
+            continue
+        best = min(fits, key=lambda one: one.deviance)
+        numbers = sum(key in more for key in candidate.free)
+        trails_by = log_likelihood_gain(best, last) - TUNING.price * (step.chosen.numbers - numbers)
+        yield from _equivalent([replace(rival, ship=best.ship, trails_by=trails_by)], found.dispersion)
 
 
 def _with_wider_profile(chosen: FittedCandidate, known: Dispersion) -> FittedCandidate:
