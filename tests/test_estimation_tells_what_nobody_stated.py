@@ -111,6 +111,23 @@ def test_what_nobody_stated_is_told_with_its_size(kind: str) -> None:
     assert f"towards {toward:.0f} deg" in current_sentence(told.current)
 
 
+@pytest.mark.parametrize("late_s", [6.0, *(pytest.param(size, marks=pytest.mark.thorough) for size in (2.0, 3.5))])
+def test_dead_times_of_many_rows_are_told_in_their_size(late_s: float) -> None:
+    """An estimate is linear in a dead time about the one that orders are delivered with; of 6 s it first finds 4.6."""
+    (answer,) = found(run(1, rudder1_delay_s=late_s)).answers
+    assert answer.signal == "rudder1"
+    assert abs(answer.late_s - late_s) < 4 * answer.std_s < 0.2
+
+
+def test_a_dead_time_that_does_not_settle_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    unstated = import_module("expdesign.assessment.unstated")
+    monkeypatch.setattr(unstated, "MOST_DELIVERIES", 1)
+    told = found(run(1, rudder1_delay_s=6.0), methods=("ls",))
+    assert not told.answers
+    (note,) = [text for text in told.notes if "inputs are answered" in text]
+    assert note == f"Whether inputs are answered when the vessel file says is not known: {unstated.UNSETTLED}."
+
+
 @pytest.mark.parametrize("methods", [("ls",), pytest.param(("ls", "iv"), marks=pytest.mark.thorough)])
 def test_other_methods_are_biased_alike_and_tell_the_same(methods: tuple[str, ...]) -> None:
     told = found(run(1, helm_later_s=0.4), methods=methods)

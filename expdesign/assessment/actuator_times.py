@@ -77,10 +77,10 @@ def value(vessel: Vessel, name: str) -> float:
 
 def found_times(found: Estimate, vessel: Vessel) -> dict[str, tuple[float, float]]:
     """Value and standard deviation of each time that an estimate found beside what the vessel delivers inputs with."""
-    return {name: (max(time, 0.0), own) for name, (time, own) in _free_times(found, vessel).items()}
+    return {name: (max(time, 0.0), own) for name, (time, own) in free_times(found, vessel).items()}
 
 
-def _free_times(found: Estimate, vessel: Vessel) -> dict[str, tuple[float, float]]:
+def free_times(found: Estimate, vessel: Vessel) -> dict[str, tuple[float, float]]:
     """The same; less than zero where the ship answers before the recorded orders."""
     names, std = found.nuisance_names, np.sqrt(np.diag(found.joint_covariance))[len(found.names) :]
     known = response_values(vessel.actuators)
@@ -173,7 +173,7 @@ def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Ve
     )
     early = [
         f"{name.removesuffix('_delay_s')} {-time:.2g} ± {own:.1g} s"
-        for name, (time, own) in _free_times(found, vessel).items()
+        for name, (time, own) in free_times(found, vessel).items()
         if name.endswith("_delay_s") and time < -SURELY_EARLY * own
     ]
     if early:

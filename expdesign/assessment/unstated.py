@@ -7,7 +7,7 @@ her sway terms other signs.
 
 So output error is repeated with a current, and with a dead time of every input, free. With t the times so found and S
 their covariance, one alone, others held, is g_i / J_ii with the standard deviation J_ii^(-1/2), where J = S^-1 and
-g = J t.
+g = J t. Inputs are delivered with the times found until these hardly change.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from expdesign.assessment.actuator_times import known_times
+from expdesign.assessment.actuator_times import (
+    MOST_DELIVERIES,
+    SETTLED_CHANGE,
+    free_times,
+    known_times,
+    value,
+    with_times,
+)
+from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.output_error import ActuatorTime
 from expdesign.estimation.regression import STEADY_CURRENT
 from expdesign.estimation.values import Estimate
@@ -29,6 +37,7 @@ from expdesign.vessel import Vessel
 
 UNKNOWN_S = 10.0  # standard deviation with which a dead time is as good as unknown
 SURE = 3.0  # standard deviations of a time from which it is told; a current as seldom as a time by chance
+UNSETTLED = "she seems to answer much later or sooner, but by how much does not settle; diagnose looks further"
 MATTERS = 2.0  # standard deviations by which it moves a parameter at least
 
 
@@ -102,18 +111,33 @@ def answers(held: Estimate, raw: Record, vessel: Vessel, again: Again, *, smooth
     free = {f"{name}_delay_s": name for name in _ordered(raw, vessel)}
     if not free:
         return ()
-    ship = replace(vessel, std={**vessel.std, **dict.fromkeys(free, UNKNOWN_S)})
-    record = reduced(raw, ship, smoothed=smoothed)
-    found = again(ship, record, known_times(ship, ship, record))
-    rows = [index for index, name in enumerate(found.nuisance_names) if name in free]
-    most = moved(held, found)
-    if not rows or most is None:
+    stated = replace(vessel, std={**vessel.std, **dict.fromkeys(free, UNKNOWN_S)})
+    ship, most, sure = stated, None, list[tuple[int, float, float]]()
+    for _ in range(MOST_DELIVERIES):
+        record = reduced(raw, ship, smoothed=smoothed)
+        try:
+            found = again(ship, record, known_times(stated, ship, record))
+        except (InputError, NoAnswer, np.linalg.LinAlgError):
+            if sure:
+                raise NoAnswer(UNSETTLED) from None
+            raise
+        times = free_times(found, ship)
+        names = [name for name in times if name in free]
+        places = len(found.names) + np.array([found.nuisance_names.index(name) for name in names], dtype=int)
+        late_s = np.array([times[name][0] - value(vessel, name) for name in names])
+        sure = _surest(late_s, found.joint_covariance[np.ix_(places, places)]) if names else []
+        most = moved(held, found)
+        # an estimate is linear in a time about the one that inputs are delivered with, and wrong far from it
+        after = with_times(ship, {name: (max(time, 0.0), std) for name, (time, std) in times.items()})
+        if not sure or all(abs(value(after, n) - value(ship, n)) < SETTLED_CHANGE * times[n][1] for n in names):
+            break
+        ship = after
+    else:
+        raise NoAnswer(UNSETTLED)
+    if most is None:
         return ()
-    places = len(found.names) + np.array(rows)
-    sure = _surest(found.nuisance_values[rows], found.joint_covariance[np.ix_(places, places)])
     return tuple(
-        Answer(signal=free[found.nuisance_names[rows[index]]], late_s=late_s, std_s=std_s, moved=most)
-        for index, late_s, std_s in sure
+        Answer(signal=free[names[index]], late_s=late_s, std_s=std_s, moved=most) for index, late_s, std_s in sure
     )
 
 
