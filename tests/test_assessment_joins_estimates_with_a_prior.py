@@ -70,6 +70,21 @@ def test_information_of_prior_and_data_adds_up(seed: int) -> None:
     np.testing.assert_allclose(after.covariance, expected[:2, :2], rtol=1e-9)
 
 
+@pytest.mark.parametrize("size", [1e4, 1e8, 1e12])
+def test_data_that_hardly_show_a_combination_leave_it_to_the_prior(size: float) -> None:
+    """Of a boat's shafts and drag they show a sum alone."""
+    before, along = found(5), np.array([0.8, -0.6, 0.3])
+    joint = before.joint_covariance + size * np.outer(along, along)
+    model = replace(known([0.5, 2.0]), parameter_range={"X_u": (1.0, np.inf)})
+    after = with_prior(replace(before, joint_covariance=joint, covariance=joint[:2, :2]), model)
+    assert np.linalg.eigvalsh(after.joint_covariance).min() > 0
+    seen = np.linalg.svd(along[None])[2][1:]  # directions of which the data tell
+    information = seen.T @ np.linalg.inv(seen @ before.joint_covariance @ seen.T) @ seen
+    expected = np.linalg.inv(information + np.diag([0.5**-2, 2.0**-2, 0.0]))
+    np.testing.assert_allclose(after.joint_covariance, expected, rtol=10 / size + 1e-3)
+    assert after.values[0] == pytest.approx(1.0)
+
+
 def test_a_parameter_without_standard_deviation_keeps_its_value() -> None:
     after = with_prior(found(0), known([0.0, 1.0]))
     assert after.values[0] == pytest.approx(0.3, abs=1e-12)
@@ -116,6 +131,14 @@ def test_values_in_range_are_the_most_probable_of_many(seed: int) -> None:
     assert (best <= high).all()
     others = np.clip(best + 10.0 ** rng.uniform(-6, 1, (5000, 1)) * rng.normal(size=(5000, 4)), low, high)
     assert apart(best[None])[0] <= apart(others).min() * (1 + 1e-9)
+
+
+def test_values_follow_each_other_though_rounding_left_a_negative_variance() -> None:
+    """Where data hardly show a difference, the covariance that remains beside it is rounded by more than its least."""
+    covariance = np.ones((2, 2)) - 1e-10 * np.outer([1.0, -1.0], [1.0, -1.0])
+    assert np.linalg.eigvalsh(covariance)[0] < 0
+    moved = into_range(np.array([0.3, 0.1]), covariance, [(0.5, np.inf), (-np.inf, np.inf)])
+    assert moved == pytest.approx([0.5, 0.3], abs=1e-5)
 
 
 def test_a_range_falls_away_where_the_estimate_alone_contradicts_it() -> None:

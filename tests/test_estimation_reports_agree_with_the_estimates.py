@@ -11,8 +11,9 @@ from expdesign.assessment.misfit import Limits
 from expdesign.errors import Diverged
 from expdesign.estimation.excitation import WorstCase, check_excitation, worst_case
 from expdesign.estimation.instrumental import Settings
-from expdesign.estimation.methods import estimate
+from expdesign.estimation.methods import estimate, faint_notes
 from expdesign.estimation.replay.replay import Integration, simulate_batch
+from expdesign.estimation.solve.null_space import Direction, NullSpace
 from expdesign.export.files.estimates import limit_entries
 from expdesign.signals import Commands, fit_percent
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
@@ -124,3 +125,21 @@ def test_shares_of_a_misfit_are_told_only_where_they_add_up(growth: float, told:
     assert (entry["slow"] is not None) == told
     assert entry["ahead_share"] == {"u": 0.5, "v": 0.5, "r": 0.5}
     assert ("unstable" in entry["sentence"]) == (not told)
+
+
+def test_combinations_that_data_hardly_show_are_told_in_one_sentence() -> None:
+    """Twenty sentences of a twin-screw ship hid what else was to be said."""
+    names = ("X_n1", "X_n2", "X_un1")
+
+    def faint(*strengths: float) -> NullSpace:
+        directions = tuple(
+            Direction(parameters=names[place : place + 2], weights=np.array([0.8, -0.6]), strength=strength, change={})
+            for place, strength in enumerate(strengths)
+        )
+        return NullSpace(singular_values=np.ones(3), unseen=(), faint=directions)
+
+    assert faint_notes(faint()) == []
+    (alone,) = faint_notes(faint(1e-6))
+    assert alone.endswith("this combination of parameters: X_n1 and X_n2: 0.80 X_n1 - 0.60 X_n2.")
+    (several,) = faint_notes(faint(1e-6, 1e-8))
+    assert "2 combinations of X_n1, X_n2, X_un1; least about X_n2 and X_un1:" in several

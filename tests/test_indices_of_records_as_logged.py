@@ -22,7 +22,7 @@ from expdesign.indices.criteria import Verdict
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch
-from expdesign.simulation import Conduct, stopping, turning_circle, zigzag
+from expdesign.simulation import Conduct, simulate, stopping, turning_circle, zigzag
 from expdesign.vessel import Vessel
 from measured_trials import TUG, TUG_TRUE, as_batch, quiet, write_run
 from nomoto_ship import nomoto_ship
@@ -280,6 +280,19 @@ def test_noise_on_the_rudder_reading_makes_no_orders(angle: float, seed: int) ->
     helm = np.array(stop.inputs)
     helm[:, 1] = rng.normal(math.radians(3.5), math.radians(0.5), len(helm))
     assert isinstance(measured_trial(ship, replace(stop, inputs=helm)), Stop)
+
+
+@pytest.mark.parametrize(("ahead_s", "stops"), [(0, True), (120, True), (900, False)])
+def test_a_stop_after_which_the_ship_sails_on_is_more_than_one_trial(ahead_s: int, stops: bool) -> None:
+    """A whole day of trials was judged by the first seconds of it, in which the engines happened to stop."""
+    ship = nomoto_ship(sample_time_s=1.0)
+    commands, stop = stopping(ship, conduct=Conduct(speed_mps=7.0, approach_s=30.0, duration_s=600.0))
+    values = np.concatenate([commands.values, np.repeat(commands.values[:1], ahead_s, axis=0)])
+    commands = replace(commands, values=values)
+    found = measured_trial(ship, as_batch(ship, commands, simulate(ship, commands, velocity=tuple(stop.velocity[0]))))
+    assert isinstance(found, Stop) == stops
+    if not stops:
+        assert "one trial in a file" in found.reason
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])

@@ -63,11 +63,12 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
     prior = model.parameter_covariance[np.ix_(places, places)]
     apart = model.parameters[places] - found.values
     noise = found.joint_covariance - found.between_runs
-    gain = np.linalg.solve(noise[:count, :count] + prior, noise[:count]).T
+    both = noise[:count, :count] + prior
+    size = np.sqrt(np.where(np.diag(both) > 0, np.diag(both), 1.0))
+    gain = np.linalg.solve(both / np.outer(size, size), noise[:count] / size[:, None]).T / size
     kept = np.eye(len(noise))
     kept[:, :count] -= gain  # what of an error of the data stays
-    joint = noise - gain @ noise[:count] + kept @ (found.joint_covariance - noise) @ kept.T
-    joint = (joint + joint.T) / 2
+    joint = kept @ found.joint_covariance @ kept.T + gain @ prior @ gain.T  # a sum of squares, whatever is rounded
     distance = float(apart @ np.linalg.solve(found.covariance + prior, apart))
     chance = float(scipy.special.chdtrc(count, distance))
     warnings = found.warnings

@@ -294,8 +294,12 @@ def _statistics(regression: Regression, solution: Solution, left_out: int) -> Re
 
 
 def faint_notes(found: NullSpace) -> Sequence[str]:
-    """One sentence per combination of parameters that the data hardly show."""
-    return [
-        f"The data contain almost no information about this combination of parameters: {direction}."
-        for direction in found.faint
-    ]
+    """One sentence on the combinations of parameters that the data hardly show."""
+    if not found.faint:
+        return []
+    faintest = min(found.faint, key=lambda direction: direction.strength)
+    if len(found.faint) == 1:
+        return [f"The data contain almost no information about this combination of parameters: {faintest}."]
+    names = dict.fromkeys(name for direction in found.faint for name in direction.parameters)
+    several = f"{len(found.faint)} combinations of {', '.join(names)}"
+    return [f"The data contain almost no information about {several}; least about {faintest}."]

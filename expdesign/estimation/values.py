@@ -160,7 +160,7 @@ def feedback_notes(found: Feedback | None) -> Sequence[str]:
     ]
 
 
-ROUNDING = 1e-12  # added to correlations, of which some are nearly one
+ROUNDING = 1e-12  # least variance of a combination of correlated numbers, of which some are nearly one
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -253,7 +253,8 @@ def into_range(values: Array, covariance: Array, ends: Sequence[tuple[float, flo
     free = std > 0
     size = std[free]
     correlation = covariance[np.ix_(free, free)] / np.outer(size, size)
-    white = np.linalg.inv(np.linalg.cholesky(correlation + ROUNDING * np.eye(len(size))))
+    shares, axes = np.linalg.eigh(correlation)
+    white = (axes / np.sqrt(np.maximum(shares, ROUNDING))).T
     bounds = (low[free] / size, high[free] / size)
     found = values.copy()
     found[free] = size * scipy.optimize.lsq_linear(white, white @ (values[free] / size), bounds=bounds, method="bvls").x

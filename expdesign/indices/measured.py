@@ -34,6 +34,7 @@ TOLD_CURRENT_MPS = 0.1  # current by which is told what one that nobody removed 
 
 
 LEAST_HELM_RAD = math.radians(2.0)
+GONE_ON = 5.0  # ship lengths ahead after a stop, from which a record is of more than one trial
 TURNED_RAD = math.radians(80.0)
 Samples = NDArray[np.intp]
 
@@ -81,6 +82,13 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     if found is None or speed < _slow(run):
         last = f"makes {run.velocity[-1, 0]:.2g} m/s ahead where the record ends"
         return NotStandard(name=batch.name, reason=f"{helm}, and the ship {last}")
+    gone_on = _ahead_again(run, astern + found.time_s)
+    if gone_on > GONE_ON:
+        reason = (
+            f"the ship stops after {found.time_s + astern - run.time_s[0]:.0f} s and then sails {gone_on:.0f} ship "
+            "lengths ahead, expected one trial in a file"
+        )
+        return NotStandard(name=batch.name, reason=reason)
     return replace(found, remarks=(*remarks, _over_ground("track reach and head reach", found.time_s)))
 
 
@@ -354,6 +362,12 @@ def _astern(run: SteeredRun) -> float | None:
         return None
     left = np.flatnonzero(np.abs(run.drive[: stopped[0] + 1] - first) > 0.02 * first)
     return float(run.time_s[left[0]]) if len(left) else None
+
+
+def _ahead_again(run: SteeredRun, since_s: float) -> float:
+    """Ship lengths that the ship goes ahead after a time."""
+    surge = run.velocity[run.time_s > since_s, 0]
+    return float(np.maximum(surge, 0.0).sum() * run.sample_time_s / run.length_m)
 
 
 def _degrees(angle_rad: float) -> str:
