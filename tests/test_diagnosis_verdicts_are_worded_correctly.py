@@ -182,6 +182,8 @@ def test_every_verdict_is_a_sentence_of_what_one_of_how_sure_and_one_of_what_to_
         assert text.endswith(".")
         assert "nan" not in text
         assert text.startswith("Look at the record first") is bool(faults)
+        shown = verdict(found, empty, unexplained=remains, faults=faults, confirmed=("The watch was right",), **more)
+        assert shown == f"The watch was right. {text.replace('show no error', 'show no other error')}"
     for said in remarks("runs", remains, (lead,), ("wind",), ("a steady force",)):
         assert "nan" not in said
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.data import has_wind
 from expdesign.diagnosis.motion import stable_windows
 from expdesign.diagnosis.select import Suspected, suspected_tests
@@ -316,6 +317,24 @@ def test_a_diagnosis_takes_over_what_the_alarm_named(vessel: Vessel, tmp_path: P
     assert [*named] == ["theta:X_uu"]
     assert alarm["in_words"] in named["theta:X_uu"]
     assert with_alarms(vessel, [tmp_path / "other.csv"])[1] == {}
+    (tmp_path / "monitor.json").write_text(json.dumps({"alarms": [alarm | {"effect": "yaw:I_r"}]}))
+    assert with_alarms(vessel, [tmp_path / "since-change.csv"])[1] == {}
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("effect", ["gain", "theta:N_ur"])
+def test_a_verdict_begins_with_what_an_alarm_named_where_the_data_show_it(vessel: Vessel, effect: str) -> None:
+    """Also where the uncertain parameters of the file explain it, so that nothing is found beside them."""
+    still = replace(CALM, surge_mps2=2e-4, yaw_radps2=2e-6)
+    (weaker,) = sailed([Ship(thrust=0.9)], HOUR // 4, seeds=[1], sea=still)
+    found = diagnose(vessel, as_record(vessel, weaker), suspected={effect: "It was named"})
+    shown = effect == "gain"
+    finding = found.findings[0].keys == (effect,) if found.findings else False
+    assert (
+        found.verdict.startswith("It was named; tested first and alone, the data show it: gain by -0.1") or finding
+    ) == shown
+    assert "These data show no error" not in found.verdict or not shown
+    assert any(note.startswith("It was named; ") for note in found.notes) == (finding or not shown)
 
 
 def test_what_an_alarm_named_is_tested_first_and_alone(vessel: Vessel) -> None:

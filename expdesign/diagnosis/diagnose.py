@@ -281,9 +281,14 @@ def diagnose(
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
-    order = np.argsort(-losses_without(chosen.kept, chosen.held, chosen.validation, windows), kind="stable").tolist()
+    shown = {one.effect: one for one in chosen.suspected if one.confirmed}
+    losses = losses_without(chosen.kept, chosen.held, chosen.validation, windows)
+    own = [bool(shown.keys() & {*step.chosen.keys}) for step in chosen.kept.steps]
+    order = np.lexsort([-losses, ~np.array(own, dtype=bool)]).tolist()  # what was named before and is shown comes first
     beside = () if chosen.wrong is None else (chosen.wrong.step,)
     steps = [*(chosen.kept.steps[index] for index in order), *beside]
+    found = {key for step in steps for key in step.chosen.keys}
+    first = [f"{(suspected or {})[key]}; {one.in_words}" for key, one in shown.items() if key not in found]
     ranked = (*(findings[index] for index in order), *findings[len(order) :])
     harmless = bool(findings) or not harms(ship, chosen.kept.last.ship, record)
     within = _gains_within_std(chosen, ship, seed) if harmless and not findings else ()
@@ -311,7 +316,7 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit, unexplained, within, signs, kinds, record.faults),
+        verdict=verdict(ranked, before, unit, unexplained, within, signs, kinds, record.faults, first),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -319,7 +324,11 @@ def diagnose(
         residuals=one_step_residuals(ship, windows),
         step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
-            *(f"{suspected[test.effect]}; {test.in_words}" for test in chosen.suspected if suspected),
+            *(
+                f"{(suspected or {})[test.effect]}; {test.in_words}"
+                for test in chosen.suspected
+                if test.effect in found or not test.confirmed
+            ),
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
             *note_on_divergence(before, windows, re_estimated=begun is not ship, uncertain=bool(uncertain_keys(ship))),
             *remarks(unit, unexplained, signs, refused, instead, kinds if ranked else ()),

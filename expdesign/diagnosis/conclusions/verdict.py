@@ -119,8 +119,11 @@ def verdict(
     signs: Sequence[Lead] = (),
     kinds: Sequence[str] = (),
     faults: Sequence[str] = (),
+    confirmed: Sequence[str] = (),
 ) -> str:
     """What the simulation lacks, how sure that is, and what to do: three sentences, a fault of the record first.
+
+    What was named before and is shown stands in front of them, unless a finding is the same.
 
     Args:
         findings: by what the model loses without each.
@@ -131,6 +134,7 @@ def verdict(
         signs: causes that are no findings, where the error is more than noise.
         kinds: what the error looks like, which no cause of the catalogue is and no model can get.
         faults: of the record itself, which are to be looked at before any cause is believed.
+        confirmed: tests of what was named before and is shown.
     """
     if findings and _is_unfit(before, findings, unexplained):
         unfit = f"The model is unfit for these runs, {accuracy_in_words(before)}"
@@ -167,6 +171,8 @@ def verdict(
     if faults:  # what is to be done, and a record that is in doubt clears no model
         known = [_accuracy(before)] if sentences[0].startswith(NO_ERROR) else sentences[:-1]
         sentences = [f"Look at the record first: {faults[0].rstrip('.')}", *known]
+    if confirmed:
+        sentences = [*confirmed, *(text.replace(NO_ERROR, NO_ERROR.replace("no", "no other")) for text in sentences)]
     return _sentences(sentences)
 
 

@@ -19,6 +19,9 @@ from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.vessel.quantities import effect_row
 
+LEAST_P = 1e-15
+"""That is told as a number."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Suspected:
@@ -40,7 +43,8 @@ class Suspected:
         unit = effect_row(self.effect).unit
         size = f"{rounded(self.value, self.std)}{' ' * bool(unit)}{unit}"
         answer = "the data show it" if self.confirmed else "the data do not show it"
-        return f"tested first and alone, {answer}: {self.effect} by {size}, p = {self.p_value:.2g}"
+        name, chance = self.effect.removeprefix("theta:"), max(self.p_value, LEAST_P)
+        return f"tested first and alone, {answer}: {name} by {size}, p {'=' if chance > LEAST_P else '<'} {chance:.2g}"
 
 
 def suspected_tests(ship: ExtendedModel, windows: Windows, effects: Sequence[str]) -> tuple[Suspected, ...]:

@@ -33,6 +33,8 @@ from expdesign.workflows.outcome import Outcome, finished, shared, workflow
 from expdesign.workflows.steps.measured import doubted, equipped, measured
 
 SINCE_CHANGE = "since-change.csv"  # file that a watch leaves for a diagnosis
+WITHOUT_SHIP = "yaw"
+"""Of changes that a watch by a yaw model names, which are none of the vessel file's model."""
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 
@@ -85,7 +87,9 @@ def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, s
             effect, size, words = str(alarm["effect"]), math.hypot(alarm["value"], alarm["std"]), alarm["in_words"]
         except (ValueError, KeyError, IndexError, TypeError):
             raise FileError(told, "alarms", f"is not as expdesign monitor leaves it beside {path.name}") from None
-        named[effect] = f"{path.name}: expdesign monitor named {words}"
+        if effect.startswith(WITHOUT_SHIP):
+            continue
+        named[effect] = f"Of {path.name} expdesign monitor named {words}"
         if (name := effect.removeprefix("theta:")) in names and size > std[names.index(name)] > 0.0:
             std[names.index(name)] = size
             named[effect] += f"; the standard deviation of {name} is taken as {size:.3g}"
