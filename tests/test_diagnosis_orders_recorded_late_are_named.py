@@ -76,6 +76,16 @@ def test_a_dead_time_that_is_stated_is_first_found_shorter():
     assert gone[1] > 0
 
 
+@pytest.mark.parametrize(("samples", "named"), [(1, False), (2, True)])
+def test_less_than_half_a_sample_is_how_a_record_is_read(samples: int, named: bool):
+    """A rudder that acts 0.6 s later makes orders that are recorded 1 s late 0.4 s late, and 2 s late ones 1.4 s."""
+    sailed = hidden_record("coaster", seed=7, batches=4, samples=150, effects={"delay_s": 0.6, "acts_on": 0b11})
+    found = diagnose(vessel_of("coaster"), with_late_orders(sailed, samples), seed=0)
+    sizes = [item.estimates[0] for item in found.findings if item.cause == "late_orders"]
+    assert bool(sizes) is named
+    assert all(abs(one.value - 1.4) < 3.0 * one.std for one in sizes)
+
+
 @pytest.mark.parametrize(
     ("ship", "seeds"), [("coaster", range(2)), pytest.param("barge", range(10, 20), marks=pytest.mark.thorough)]
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -177,8 +178,11 @@ ACTUATOR_DELAY = Cause(
 
 
 def _candidates_late_orders(situation: Situation) -> tuple[Candidate, ...]:
-    """Of inputs without a dead time: one that is stated and too long is a dead time to be found shorter, to zero."""
-    ship = situation.ship
+    """Of inputs without a dead time: one that is stated and too long is a dead time to be found shorter, to zero.
+
+    Up to half a sample is how a record is read: its orders are held, while what was recorded may have been on its way.
+    """
+    ship, half_s = situation.ship, situation.windows.sample_s / situation.windows.rows_per_step / 2.0
     delayed = {
         column
         for key, value in ship.effects.items()
@@ -186,7 +190,7 @@ def _candidates_late_orders(situation: Situation) -> tuple[Candidate, ...]:
         for column in group_columns(key.split(":", 1)[1], ship.model.inputs)
     }
     return tuple(
-        one
+        replace(one, above=dict.fromkeys(one.free, half_s))
         for one in followers(situation, "lead", "late_orders")
         for key in one.free
         if not delayed & {*group_columns(key.split(":", 1)[1], ship.model.inputs)}
