@@ -1,5 +1,6 @@
 """Instruments are compared before any model: faults are named with their size, clean records give no note."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -115,6 +116,27 @@ def test_what_a_gyro_and_a_heading_show_of_each_other_bounds_what_a_diagnosis_ma
                 for beyond in (max(high, 0.0) + 0.1, min(low, 0.0) - 0.1):
                     assert not model.with_effects({key: beyond}).is_possible([key])
     assert inside >= 2 * COUNT * (0.95 - 3.0 * np.sqrt(0.95 * 0.05 / COUNT))
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "circle", "random", "courses"])
+def test_a_late_heading_is_not_taken_for_another_place_or_another_clock(
+    tmp_path: Path, ship: Vessel, kind: str
+) -> None:
+    for log in voyages(3, kind):
+        (finding,) = findings(tmp_path, later("heading_rad", samples=3)(log), ship).values()
+        assert finding.name == "yaw_rate_delay_s"
+        assert finding.text.startswith("the heading comes ")
+        assert abs(finding.value + 3.0) < 3.0 * finding.std
+
+
+def test_a_sway_in_knots_is_named_beside_the_place_that_it_looks_like(tmp_path: Path, ship: Vessel) -> None:
+    """In steady turns ships drift in proportion to how they turn."""
+    for kind, number in (("zigzag", 0), ("circle", 2)):
+        log = voyages(3, kind)[number]
+        place = findings(tmp_path, scaled("v_mps", by=3600 / 1852)(log), ship)["position_forward_m"]
+        scale, std = re.search(r"or v_mps is (\S+) ± (\S+) times the sway speed", place.text).groups()
+        assert abs(float(scale) - 3600 / 1852) < 4.0 * float(std)
+    assert "v_mps is" not in findings(tmp_path, moved(voyages(1, "random")[0]), ship)["position_forward_m"].text
 
 
 ALIKE_IN_A_CIRCLE = "surge_scale", "velocity_delay_s", "position_delay_s"

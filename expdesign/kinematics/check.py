@@ -359,9 +359,22 @@ def _disagreements(batches: Sequence[Batch], vessel: Vessel, model: VesselModel)
     course = list(course_as_heading(batches, length_m=length_m, drifts=drifts(batches, model, length_m)))
     yield from course
     if not course:
-        yield from gyro_against_heading(batches, length_m=length_m)
-        yield from log_against_positions(batches, length_m=length_m)
+        gyro = list(gyro_against_heading(batches, length_m=length_m))
+        yield from gyro
+        late_s = max(0.0, -sum(item.value for item in gyro if item.name == "yaw_rate_delay_s"))
+        # a heading that is late bends the way that a log tells, as would an antenna elsewhere
+        turned = [_heading_sooner(batch, late_s) for batch in batches] if late_s else batches
+        yield from log_against_positions(turned, length_m=length_m)
     yield from against_inputs(batches, model, length_m=length_m)
+
+
+def _heading_sooner(batch: Batch, late_s: float) -> Batch:
+    """A batch with the heading of so much later [s]; nan where it ends before."""
+    if batch.pose is None:
+        return batch
+    pose = batch.pose.copy()
+    pose[:, 2] = np.interp(batch.time_s + late_s, batch.time_s, pose[:, 2], right=np.nan)
+    return replace(batch, pose=pose)
 
 
 def drifts(batches: Sequence[Batch], model: VesselModel, length_m: float) -> float:

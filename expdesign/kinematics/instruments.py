@@ -34,6 +34,7 @@ TURN_MATTERS_RAD = 0.0175  # misalignment that is told [rad]
 RATE_MATTERS = 0.1  # bias of a rate, as a share of its root mean square, that is told
 PLACE_STD = 0.001  # standard error of a place, at least, in ship lengths: small differences of clocks imitate that
 PLACE_MATTERS = 0.05  # distance of an instrument, in ship lengths, that is told
+ALIKE = 1.05  # what an explanation may leave, by what another one leaves, to be named beside it
 DELAY_MATTERS = 0.6  # of one instrument after another, in samples, that is told; Euler's map alone gives a half
 DELAY_STD = 0.05  # standard error of a delay, at least, in samples
 DELAY_ROUNDS = 2  # in which the delay of a log is found
@@ -145,6 +146,7 @@ class _Log:
     late_s: float = 0.0  # by which the velocities were late, and were moved before
     # the same with a scale of sway of its own, which is not certainly another; None where nothing tells
     apart: _Log | None = None
+    placed: _Log | None = None  # with that scale in place of another place of the positions
 
     def of(self, name: str) -> tuple[complex, Array]:
         """Coefficient of a regressor, and the standard errors of its parts."""
@@ -183,7 +185,9 @@ def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
             break
         late_s += found.of("log")[0].real
         found = _certain(related, tuple(name for name in found.names if name in optional))
-    return found if found is None or "side" in found.names else replace(found, apart=related((*found.names, "side")))
+    if found is None or "side" in found.names:
+        return found
+    return replace(found, apart=related((*found.names, "side")), placed=related(("drift", "side")))
 
 
 def _certain(related: Callable[[Sequence[str]], _Log | None], optional: Sequence[str]) -> _Log | None:
@@ -293,9 +297,21 @@ def _place(found: _Log, sample_time_s: float, speed: float, *, length_m: float) 
             name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.ahead.rest,
             text=f"the positions are those of a place {plus_minus(abs(arm.real), spread[0])} m {ahead} and "
             f"{plus_minus(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured"
-            + (f", or {clock} {abs(arm.real) / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) and not late
-               else "."),
+            + (f", or {clock} {abs(arm.real) / speed:.2g} s late" if abs(arm.real) > abs(arm.imag) and not late else "")
+            + f"{_sway_alike(found)}.",
         )  # fmt: skip
+
+
+def _sway_alike(found: _Log) -> str:
+    """A scale of sway that explains as much as another place: ships drift by about as much as they turn."""
+    other = found.placed
+    if other is None or other.ahead.rest > ALIKE * found.ahead.rest:
+        return ""
+    side, spread = other.of("side")
+    scale, std = 1.0 / side.real, spread[0] / side.real**2
+    if abs(scale - 1.0) < max(CERTAIN * std, SCALE_MATTERS):
+        return ""
+    return f", or v_mps is {plus_minus(scale, std)} times the sway speed that the positions give"
 
 
 def course_as_heading(batches: Sequence[Batch], *, length_m: float, drifts: float) -> Iterator[Finding]:
