@@ -51,16 +51,7 @@ def unit_information(
     grams = gram_matrices(found, noise)
     rows = []
     for name in np.unique(unit):
-        kept = unit == name
-        part = replace(
-            grams,
-            XX=grams.XX[kept],
-            Xe=grams.Xe[kept],
-            ee=grams.ee[kept],
-            effect_starts=grams.effect_starts[kept],
-            error_starts=grams.error_starts[kept],
-        )
-        rows.append(marginalised(part, found, noise).A)
+        rows.append(marginalised(grams.selected(unit == name), found, noise).A)
     return np.stack(rows)
 
 

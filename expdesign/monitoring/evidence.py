@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,22 +89,19 @@ class Grams:
 
     def part(self, stretches: slice) -> Grams:
         """Some of the stretches."""
-        return replace(
-            self,
-            time_s=self.time_s[stretches],
-            duration_s=self.duration_s[stretches],
-            products=self.products[:, stretches],
-            counts=self.counts[:, stretches],
-            budget=self.budget[stretches],
-            kind=self.kind[stretches],
-            shoal=self.shoal[stretches],
-            heading=self.heading[stretches],
-        )
+        places = {name: (slice(None),) * axis + (stretches,) for name, axis in _ALONG.items()}
+        return replace(self, **{name: getattr(self, name)[place] for name, place in places.items()})
 
     @property
     def forces(self) -> int:
         """Number of components of the unmeasured force."""
         return int(self.products.shape[-1] - self.changes - STARTS - self.ramps - 1)
+
+
+_ALONG = {
+    "time_s": 0, "duration_s": 0, "products": 1, "counts": 1, "budget": 0, "kind": 0, "shoal": 0, "heading": 0,
+}  # fmt: skip
+"""Field of `Grams` -> its axis of stretches."""
 
 
 def grams_of(
@@ -302,20 +300,9 @@ def stretch_kinds(u: Array, r: Array, step_s: float) -> NDArray[np.int64]:
 
 def joined(parts: Sequence[Grams]) -> Grams:
     """Stretches of several records as one."""
-    return Grams(
-        time_s=np.concatenate([part.time_s for part in parts]),
-        duration_s=np.concatenate([part.duration_s for part in parts]),
-        products=np.concatenate([part.products for part in parts], axis=1),
-        counts=np.concatenate([part.counts for part in parts], axis=1),
-        budget=np.concatenate([part.budget for part in parts]),
-        kind=np.concatenate([part.kind for part in parts]),
-        shoal=np.concatenate([part.shoal for part in parts]),
-        heading=np.concatenate([part.heading for part in parts]),
-        stretch_s=parts[0].stretch_s,
-        ramps=parts[0].ramps,
-        winds=parts[0].winds,
-        pushes=parts[0].pushes,
-    )
+    columns = {name: [getattr(part, name) for part in parts] for name in _ALONG}
+    found: dict[str, Any] = {name: np.concatenate(values, _ALONG[name]) for name, values in columns.items()}
+    return replace(parts[0], **found)
 
 
 def stretch_length(length_m: float) -> float:

@@ -29,6 +29,7 @@ from pathlib import Path
 import numpy as np
 
 import published_models as published
+import published_trials as trials
 from expdesign.cli import main as expdesign
 from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.errors import InputError
@@ -43,8 +44,8 @@ from expdesign.workflows.commands.new import BLOCK, kind_of, of_card
 from particulars import MODELS, case, known_of
 
 SHIPS = MODELS | {
-    "kcs-model": lambda: published.froude(published.kcs(), 1.0 / 75.5),
-    "esso-osaka": lambda: published.froude(published.esso_osaka(), 325.0 / 3.0),
+    "kcs-model": lambda: trials.froude(published.kcs(), 1.0 / 75.5),
+    "esso-osaka": lambda: trials.froude(published.esso_osaka(), 325.0 / 3.0),
 }
 METHODS = ("ls", "iv", "oe")
 STEPS = 10  # of the published model in a sample
@@ -116,12 +117,12 @@ def of_second_side(vessel: Vessel) -> list[str]:
     return both if "rudder2" in vessel.model.inputs else []
 
 
-def sailed(model: published.Model, vessel: Vessel, run: Primitive, rng: np.random.Generator) -> dict[str, np.ndarray]:
+def sailed(model: trials.Model, vessel: Vessel, run: Primitive, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """What the sensors read of the published model under the commands of a run, which it begins steadily or at rest."""
     begins_mps, fastest_mps = float(np.hypot(*run.entry_velocity[:2])), float(run.trajectory.velocity[:, 0].max())
     approach = steady_ahead(vessel, begins_mps or fastest_mps)
     values, sample_s = run.commands.values, vessel.sample_time_s
-    holds = published.order_for(model, approach.speed_mps) / approach.drive  # the engine order that holds is her own
+    holds = trials.order_for(model, approach.speed_mps) / approach.drive  # the engine order that holds is her own
     engines, helms = orders(vessel, values)
     state = np.array([*run.entry_velocity, 0.0, 0.0, 0.0])
     angle, states = 0.0, []
@@ -157,7 +158,7 @@ def orders(vessel: Vessel, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (port + starboard) / 2.0, np.arcsin(np.clip((port - starboard) / 2.0, -1.0, 1.0))
 
 
-def stepped(model: published.Model, state: np.ndarray, angle: float, order: float, step: float) -> np.ndarray:
+def stepped(model: trials.Model, state: np.ndarray, angle: float, order: float, step: float) -> np.ndarray:
     """One Runge-Kutta step of a state (6,)."""
 
     def rates(x: np.ndarray) -> np.ndarray:

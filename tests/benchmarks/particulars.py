@@ -21,11 +21,12 @@ from pathlib import Path
 import numpy as np
 
 import published_models as published
+import published_trials as trials
 from expdesign.particulars import Card, Nominal, Stated, Trial, nominal
 from expdesign.scenario import load_card
 
 SHIPS = Path(__file__).parent / "ships"
-MODELS: dict[str, Callable[[], published.Model]] = {
+MODELS: dict[str, Callable[[], trials.Model]] = {
     "kvlcc2": published.kvlcc2_ship,
     "kcs": published.kcs,
     "seiun-maru": published.seiun_maru,
@@ -52,7 +53,7 @@ class Case:
     source: str
 
 
-def case(name: str, model: published.Model | None = None) -> Case:
+def case(name: str, model: trials.Model | None = None) -> Case:
     """A published ship, compared with a model of her: her own, where none is given."""
     card = load_card(SHIPS / f"{name}.toml")
     if name in MEASURED and model is None:
@@ -60,13 +61,13 @@ def case(name: str, model: published.Model | None = None) -> Case:
     model = model or MODELS[name]()
     values = []
     speed = model.speed_mps
-    sides = [published.circle(model, speed=speed, helm_deg=helm) for helm in (35.0, -35.0)]
+    sides = [trials.circle(model, speed=speed, helm_deg=helm) for helm in (35.0, -35.0)]
     for quantity in sides[0]:
         value = math.sqrt(sides[0][quantity] * sides[1][quantity])
         values.append(stated(Trial(kind="circle", speed_mps=speed, angle_rad=HARD), quantity, value))
     for degrees in (10.0, 20.0):
         trial = Trial(kind="zigzag", speed_mps=speed, angle_rad=math.radians(degrees))
-        found = published.zigzag(model, speed=speed, angle_deg=degrees)
+        found = trials.zigzag(model, speed=speed, angle_deg=degrees)
         values += [stated(trial, quantity, value) for quantity, value in found.items()]
     return Case(replace(card, stated=()), tuple(values), "published model")
 
@@ -153,7 +154,7 @@ def speed_scaling() -> list[tuple[str, float, tuple[float, float], float, float]
         )
         for share, trial in zip(SHARES, also, strict=True):
             starboard, port = (
-                published.circle(model, speed=trial.speed_mps, helm_deg=helm)[DIAMETER] / model.length_m
+                trials.circle(model, speed=trial.speed_mps, helm_deg=helm)[DIAMETER] / model.length_m
                 for helm in (35.0, -35.0)
             )
             rows.append((name, share, (starboard, port), alone[trial], fitted[trial]))
