@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.errors import InputError
+from expdesign.export.files import dictionary_files, toml_value
 from expdesign.scenario import load_card, load_scenario, load_vessel
 from expdesign.workflows import new, scored
 from expdesign.workflows.commands.new import BLOCK, TEMPLATES, _sailable, _scaled, kind_of
@@ -72,6 +74,18 @@ def test_a_rudder_that_goes_less_far_turns_her_as_far_as_it_goes(tmp_path: Path)
     specs = load_scenario(new(tmp_path / "trial", card=card).files[0]).dictionary
     (circle,) = (spec for spec in specs if spec.name.startswith("circle-helm-0."))
     assert circle.settings["helm_rad"] == pytest.approx(0.6 * 20 / 35, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["Ærø", 'MS "42" \\u', "boat \N{SHIP}\x7f"])
+def test_a_ship_may_have_any_name(name: str, tmp_path: Path) -> None:
+    card = tmp_path / "card.toml"
+    text = CARDS["coaster-80m"].read_text("utf-8")
+    card.write_text(re.sub(r"^name = .*", lambda _: f"name = {toml_value(name)}", text, count=1, flags=re.M), "utf-8")
+    case = load_scenario(new(tmp_path / "trial", card=card).files[0])
+    assert case.vessel.name == name
+    assert tomllib.loads((tmp_path / "trial" / "dictionary.toml").read_text("utf-8"))["dictionary"]["name"] == name
+    files = dictionary_files(case.dictionary[:1], name=name, stem="grown")
+    assert tomllib.loads(str(files["grown.toml"]))["dictionary"]["name"] == name
 
 
 def test_candidates_that_a_ship_cannot_sail_are_left_out_and_named() -> None:

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from expdesign import __version__
 from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Figure, Listing, Table, filled, section
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import finite, strict_json, toml_comments, toml_table, toml_value
 from expdesign.export.pages.figures import GREY, LINES, light_grid, new_figure, page_figure, svg
 from expdesign.export.words import counted
 from expdesign.importing import Followed, Log, Run, Sampled, inputs_of
@@ -115,46 +115,40 @@ def _followed(value: tuple[float, float] | None) -> str:
 
 def mapping_toml(mapping: Decisions, logs: Sequence[Log], *, command: str) -> str:
     """The mapping as a file that `--map` reads."""
-    lines = [
-        "# How the channels of these logs become columns. Change what is wrong, and give the file as --map.",
-        "# Keys: expdesign explain mapping. Columns: expdesign explain data.",
-        f"# Made by: {command}",
-    ]
-    top = {"sample_time_s": mapping.sample_time_s, "length_m": mapping.length_m, "variation_deg": mapping.variation_deg,
-           "antenna_forward_m": mapping.antenna_forward_m,
-           "antenna_starboard_m": mapping.antenna_starboard_m}  # fmt: skip
-    lines += [f"{key} = {value!r}" for key, value in top.items() if value is not None]
+    lines = toml_comments(
+        [
+            "How the channels of these logs become columns. Change what is wrong, and give the file as --map.",
+            "Keys: expdesign explain mapping. Columns: expdesign explain data.",
+            f"Made by: {command}",
+        ]
+    )
+    top = ("sample_time_s", "length_m", "variation_deg", "antenna_forward_m", "antenna_starboard_m")
+    lines += toml_table("", {key: getattr(mapping, key) for key in top})
+    clockless = {log.source for log in logs if log.clock == "no clock"}
     for clock in mapping.files:
-        lines += ["", "[[file]]", f"name = {_text(clock.file)}", f"offset_s = {clock.offset_s!r}"]
-        lines += [f"offset_std_s = {clock.offset_std_s!r}"] if clock.offset_std_s else []
-        lines += [f"sample_time_s = {clock.sample_time_s!r}"] * bool(
-            clock.sample_time_s or any(log.source == clock.file and log.clock == "no clock" for log in logs)
-        )
+        step_s = clock.sample_time_s if clock.sample_time_s or clock.file in clockless else None
+        stated = {"offset_s": clock.offset_s, "offset_std_s": clock.offset_std_s or None, "sample_time_s": step_s}
+        lines += ["", *toml_table("[[file]]", {"name": clock.file, **stated})]
     for use in mapping.uses:
         if use.column:
-            lines += ["", "[[channel]]", f"file = {_text(use.file)}", f"channel = {_text(use.channel)}",
-                      f"column = {_text(use.column)}", f"unit = {_text(use.unit)}",
-                      f"scale = {use.scale!r}"]  # fmt: skip
-            lines += [f"offset = {use.offset!r}"] * bool(use.offset) + [f"why = {_text(use.why)}"] * bool(use.why)
+            entries = {**vars(use), "offset": use.offset or None, "why": use.why or None}
+            lines += ["", *toml_table("[[channel]]", entries)]
     rest = [use for use in mapping.uses if not use.column]
     if rest:
-        lines += ["", "# Not used; add a table [[channel]] for what should be:"]
-        lines += [f"# file = {_text(use.file)}, channel = {_text(use.channel)} ({use.why})" for use in rest]
+        names = (f"file = {toml_value(use.file)}, channel = {toml_value(use.channel)} ({use.why})" for use in rest)
+        lines += ["", *toml_comments(["Not used; add a table [[channel]] for what should be:", *names])]
     return "\n".join(lines) + "\n"
-
-
-def _text(value: str) -> str:
-    """A string of TOML: that of JSON, but for one letter."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def instruments_toml(content: ImportContent) -> str:
     """What the logs tell of actuators and sensors, which commands read that are given the folder."""
-    lines = [
-        "# What the logs tell of sensors and actuators, by keys of vessel files. Commands that read the runs use it",
-        "# where the vessel file says nothing, and say so. Change or delete what is wrong.",
-        f"# Made by: {content.command}",
-    ]
+    lines = toml_comments(
+        [
+            "What the logs tell of sensors and actuators, by keys of vessel files. Commands that read the runs use it",
+            "where the vessel file says nothing, and say so. Change or delete what is wrong.",
+            f"Made by: {content.command}",
+        ]
+    )
     if content.sensors:
         lines += ["", "[sensors]"]
         lines += [f"{key} = {value!r}  # {words}" for key, (value, words) in content.sensors.items()]

@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.export.document import Document, Listing, Table, section
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import finite, strict_json, toml_comments, toml_table
 from expdesign.export.words import counted, ship
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
@@ -170,19 +170,20 @@ def repeats_json(content: LoadContent, case: int) -> str:
 
 def loads_toml(content: LoadContent) -> str:
     """The load cases as `expdesign roll --loads` reads them, with --vessel."""
-    lines = ["# Load cases of a roll trial, by:", f"#     {content.command}"]
+    lines = toml_comments(["Load cases of a roll trial, by:", f"    {content.command}"])
     for case, option in enumerate(content.options):
-        lines += ["", f"# {case + 1}: {option.name}", "[[load]]"]
+        lines += ["", *toml_comments([f"{case + 1}: {option.name}"]), "[[load]]"]
         if option.load is None:
             lines.append("unknown = true")
         elif option.load.mass_kg:
-            lines += [f"mass_kg = {option.load.mass_kg!r}", f"height_m = {-option.load.z_m!r}"]
-            lines += [f"inertia_kgm2 = {option.load.inertia_kgm2!r}"] * bool(option.load.inertia_kgm2)
+            stated = {"mass_kg": option.load.mass_kg, "height_m": -option.load.z_m}
+            lines += toml_table("", {**stated, "inertia_kgm2": option.load.inertia_kgm2 or None})
     question = content.plan.question
     guessed = {name: float(question.theta[place]) for name, place in zip(question.free, question.places, strict=True)}
-    for head, values in (("known", content.known), ("start", {n: guessed[n] for n in ("m", "z_m") if n in guessed})):
+    start: Mapping[str, float] = {name: guessed[name] for name in ("m", "z_m") if name in guessed}
+    for head, values in (("known", content.known), ("start", start)):
         if values:
-            lines += ["", f"[{head}]", *(f"{name} = {value!r}" for name, value in values.items())]
+            lines += ["", *toml_table(f"[{head}]", values)]
     return "\n".join(lines) + "\n"
 
 

@@ -38,7 +38,15 @@ if TYPE_CHECKING:
         replan_json,
         track_csv,
     )
-    from expdesign.export.files.text import finite, named_finite, record_csv, strict_json
+    from expdesign.export.files.text import (
+        finite,
+        named_finite,
+        record_csv,
+        strict_json,
+        toml_comments,
+        toml_table,
+        toml_value,
+    )
     from expdesign.export.files.vessel_file import vessel_toml
 else:
     __getattr__, __all__ = load_on_use(__name__, __file__)

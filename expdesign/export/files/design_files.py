@@ -5,7 +5,6 @@ The dictionary holds motions in calm water, so velocities over ground and throug
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -16,7 +15,16 @@ from expdesign import __version__
 from expdesign.conventions import VELOCITY_COLUMNS, to_b_frame, to_n_frame
 from expdesign.dictionary.spec import Primitive, PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, bordered, limits_kept, pool_gains
-from expdesign.export.files.text import csv_text, finite, named, named_finite, sample_seconds, strict_json
+from expdesign.export.files.text import (
+    csv_text,
+    finite,
+    named,
+    named_finite,
+    sample_seconds,
+    strict_json,
+    toml_comments,
+    toml_table,
+)
 from expdesign.growing import Growth
 from expdesign.information.moments import PrimitiveInformation, log_det_or_none
 from expdesign.information.recorded import BatchInformation
@@ -168,17 +176,15 @@ def dictionary_files(
         stem: of the file names.
         comments: lines to go first.
     """
-    lines = [f"# {line}".rstrip() for line in comments] + ["[dictionary]", f"name = {json.dumps(name)}"]
+    lines = [*toml_comments(comments), *toml_table("[dictionary]", {"name": name})]
     files: dict[str, str | bytes] = {}
     for spec in specs:
-        settings = dict(spec.settings)
-        lines += ["", "[[primitives]]", f"name = {json.dumps(spec.name)}", f"family = {json.dumps(spec.family)}"]
+        stated: dict[str, str | float] = {"name": spec.name, "family": spec.family, **spec.settings}
         if spec.commands is not None:
-            file = f"{stem}-{spec.name}.csv"
+            file = stated["file"] = f"{stem}-{spec.name}.csv"
             files[file] = recorded_csv(spec.commands)
-            lines.append(f"file = {json.dumps(file)}")
-            del settings["duration_s"]
-        lines += [f"{key} = {value!r}" for key, value in settings.items()]
+            del stated["duration_s"]
+        lines += ["", *toml_table("[[primitives]]", stated)]
     return {f"{stem}.toml": "\n".join(lines) + "\n", **files}
 
 

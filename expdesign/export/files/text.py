@@ -1,11 +1,11 @@
-"""Text of result files: strict JSON and CSV in SI units, with units in the names; and results read back from JSON."""
+"""Text of result files: strict JSON, TOML and CSV in SI units, with units in the names; and results read back."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -59,6 +59,37 @@ def valued(names: Sequence[str], values: Array, stds: Array) -> dict[str, dict[s
 def finite(value: float) -> float | None:
     """The value, or None (null) where it is not a number."""
     return float(value) if math.isfinite(value) else None
+
+
+BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+NO_COMMENT = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # characters that no comment of TOML may hold
+
+
+def toml_comments(texts: Iterable[str]) -> list[str]:
+    """Lines of comments, with a replacement sign for each character that none may hold."""
+    return [
+        NO_COMMENT.sub("\N{REPLACEMENT CHARACTER}", f"# {line}".rstrip())
+        for text in texts
+        for line in text.splitlines()
+    ]
+
+
+def toml_table(head: str, entries: Mapping[str, str | float | None]) -> list[str]:
+    """Lines of a table under its head, "" for none; without what is None."""
+    rows = (f"{toml_key(name)} = {toml_value(value)}" for name, value in entries.items() if value is not None)
+    return [*[head] * bool(head), *rows]
+
+
+def toml_key(name: str) -> str:
+    """A key, in quotes where it must be."""
+    return name if BARE_KEY.fullmatch(name) else toml_value(name)
+
+
+def toml_value(value: str | float) -> str:
+    """JSON's strings and floats are TOML's, but for the control character it does not escape."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(float(value))
 
 
 GAP_SAMPLES = 10  # gap between the times of two batches, in samples

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from expdesign.errors import InputError
+from expdesign.export.files.text import toml_comments, toml_key, toml_table, toml_value
 from expdesign.values import Array
 from expdesign.vessel import (
     EXACT,
@@ -26,8 +25,6 @@ from expdesign.vessel import (
     limit_keys,
     response_keys,
 )
-
-BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
@@ -46,15 +43,14 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
             f"{vessel.model.sample_time_s:g} s, expected the same in a vessel file"
         )
     particulars = {name: getattr(vessel, name) for name in ("name", "length_m", "beam_m", "draught_m", "sample_time_s")}
-    lines = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
-    lines += _table("[vessel]", particulars)
+    lines = [*toml_comments(comments), *toml_table("[vessel]", particulars)]
     for actuator in vessel.actuators:
-        lines += ["", *_table("[[actuators]]", _actuator(actuator))]
+        lines += ["", *toml_table("[[actuators]]", _actuator(actuator))]
     lines += _model(vessel.model)
     if vessel.sensors != EXACT:
-        lines += ["", *_table("[sensors]", _sensors(vessel.sensors))]
+        lines += ["", *toml_table("[sensors]", _sensors(vessel.sensors))]
     if vessel.std:
-        lines += ["", *_table("[std]", vessel.std)]
+        lines += ["", *toml_table("[std]", vessel.std)]
     if vessel.pendulum is not None:
         lines += _pendulum(vessel.pendulum)
     lines += _environment(vessel.environment)
@@ -92,7 +88,7 @@ def _environment(environment: Environment) -> Iterator[str]:
     if environment.sea_state is not None:
         yield f"sea_state = {environment.sea_state}"
     for name, row in known.items():
-        yield f"{name} = {{{', '.join(f'{key} = {_value(value)}' for key, value in row.items())}}}"
+        yield f"{name} = {{{', '.join(f'{key} = {toml_value(value)}' for key, value in row.items())}}}"
 
 
 def _flow(to: Array, std_mps: float, variation: Variation) -> dict[str, float]:
@@ -109,30 +105,30 @@ def _flow(to: Array, std_mps: float, variation: Variation) -> dict[str, float]:
 def _model(model: VesselModel) -> Iterator[str]:
     structure = next((name for name, terms in STRUCTURES.items() if terms == model.terms), "custom")
     unstated = _unstated(model)
-    yield from ("", *_table("[model]", {"structure": structure, "form": model.form, **unstated}))
+    yield from ("", *toml_table("[model]", {"structure": structure, "form": model.form, **unstated}))
     if model.speeds_mps is not None:
         yield f"speeds_mps = [{', '.join(f'{speed:.4g}' for speed in model.speeds_mps)}]"
     if structure == "custom":
         for term in model.terms:
-            yield from ("", *_table("[[model.terms]]", vars(term)))
+            yield from ("", *toml_table("[[model.terms]]", vars(term)))
     values, stds = model.parameters.tolist(), model.parameter_std.tolist()
-    yield from ("", *_table("[model.parameters]", dict(zip(model.names, values, strict=True))))
+    yield from ("", *toml_table("[model.parameters]", dict(zip(model.names, values, strict=True))))
     open_ = model.drawn_std > model.parameter_std
     rows = zip(model.names, stds, open_.tolist(), strict=True)
     known = {name: std for name, std, unstated in rows if std > 0 or (open_.any() and not unstated)}
     if known:
-        yield from ("", *_table("[model.parameter_std]", known))
+        yield from ("", *toml_table("[model.parameter_std]", known))
     yield from _correlation(model)
     for key, side in (("parameter_min", 0), ("parameter_max", 1)):
         stated = {name: ends[side] for name, ends in model.parameter_range.items() if math.isfinite(ends[side])}
         if stated:
-            yield from ("", *_table(f"[model.{key}]", stated))
+            yield from ("", *toml_table(f"[model.{key}]", stated))
     if model.roll is not None:
         known = {key: value for key, value in vars(model.roll).items() if key != "heel_rad_per_mps2" or value}
-        yield from ("", *_table("[model.roll]", known))
+        yield from ("", *toml_table("[model.roll]", known))
     if model.inertia is not None:
         stated = {key: value for key, value in vars(model.inertia).items() if value is not None}
-        yield from ("", *_table("[model.inertia]", stated))
+        yield from ("", *toml_table("[model.inertia]", stated))
 
 
 def _unstated(model: VesselModel) -> dict[str, float]:
@@ -155,22 +151,22 @@ def _pendulum(pendulum: RollPendulum) -> Iterator[str]:
         heights["sensor_forward_m"] = body.forward_m
     if body.tilt_rad is not None:
         heights["sensor_tilt_deg"] = math.degrees(body.tilt_rad)
-    yield from ("", *_table("[roll]", heights))
+    yield from ("", *toml_table("[roll]", heights))
     if body.sensor_from_axis:
         yield "sensor_above_axis = true"
-    yield from ("", *_table("[roll.parameters]", pendulum.parameters))
+    yield from ("", *toml_table("[roll.parameters]", pendulum.parameters))
     if pendulum.parameter_std:
-        yield from ("", *_table("[roll.parameter_std]", pendulum.parameter_std))
+        yield from ("", *toml_table("[roll.parameter_std]", pendulum.parameter_std))
     given = pendulum.parameter_correlation
     if given:
         rows = {one: {other: value for (name, other), value in given.items() if name == one} for one, _ in given}
         yield from ("", "[roll.parameter_correlation]", *(_pairs(name, pairs) for name, pairs in rows.items()))
     if load.mass_kg:
         stated = {"mass_kg": load.mass_kg, "height_m": -load.z_m, "inertia_kgm2": load.inertia_kgm2}
-        yield from ("", *_table("[roll.load]", stated))
+        yield from ("", *toml_table("[roll.load]", stated))
     if pendulum.waves is not None:
         waves = {"from_deg": math.degrees(pendulum.waves.from_rad), **vars(pendulum.waves)}
-        yield from ("", *_table("[roll.waves]", {key: value for key, value in waves.items() if key != "from_rad"}))
+        yield from ("", *toml_table("[roll.waves]", {key: value for key, value in waves.items() if key != "from_rad"}))
 
 
 def _correlation(model: VesselModel) -> Iterator[str]:
@@ -189,19 +185,4 @@ def _correlation(model: VesselModel) -> Iterator[str]:
 
 
 def _pairs(name: str, pairs: Mapping[str, float]) -> str:
-    return f"{_key(name)} = {{ {', '.join(f'{_key(other)} = {value:.9g}' for other, value in pairs.items())} }}"
-
-
-def _table(head: str, entries: Mapping[str, str | float]) -> list[str]:
-    return [head, *(f"{_key(name)} = {_value(value)}" for name, value in entries.items())]
-
-
-def _key(name: str) -> str:
-    return name if BARE_KEY.fullmatch(name) else _value(name)
-
-
-def _value(value: str | float) -> str:
-    """JSON's strings and floats are TOML's, but for the control character it does not escape."""
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(float(value))
+    return f"{toml_key(name)} = {{ {', '.join(f'{toml_key(other)} = {value:.9g}' for other, value in pairs.items())} }}"

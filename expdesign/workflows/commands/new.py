@@ -20,6 +20,7 @@ from expdesign import requests
 from expdesign.dictionary import PrimitiveSpec, build_primitive
 from expdesign.errors import InputError, NoAnswer
 from expdesign.export.document import Document
+from expdesign.export.files import toml_comments, toml_value
 from expdesign.export.folder import write_files
 from expdesign.export.nominal_page import nominal_toml
 from expdesign.particulars import Card, nominal
@@ -128,7 +129,7 @@ def of_kind(name: str, kind: str) -> Start:
 
 def _files(name: str, texts: Mapping[str, str], *, length_m: float, ship: str) -> dict[str, str]:
     lines = texts["scenario"].splitlines(keepends=True)
-    renamed = [f"name = {json.dumps(name)}\n" if line.startswith("name = ") else line for line in lines]
+    renamed = [f"name = {toml_value(name)}\n" if line.startswith("name = ") else line for line in lines]
     return {
         "scenario.toml": "".join(renamed),
         "vessel.toml": texts["vessel"],
@@ -164,7 +165,8 @@ def of_card(name: str, kind: str, card: Card, *, command: str, progress: Progres
     helm = min(1.0, Helm(vessel=vessel).hardest(1.0) / HARD_OVER_RAD)
     scenario = _headed(_scaled(_text(f"{kind}/scenario.toml"), factors), f"Trials of {card.name} in an invented bay.")
     listed = _scaled(_text(f"{kind}/dictionary.toml"), factors | {"helm_rad": helm})
-    listed = re.sub(r"^name = .*", f"name = {json.dumps(card.name)}", listed, count=1, flags=re.MULTILINE)
+    named = f"name = {toml_value(card.name)}"
+    listed = re.sub(r"^name = .*", lambda _: named, listed, count=1, flags=re.MULTILINE)
     candidates, notes = _sailable(_headed(listed, f"Candidates for {card.name}."), vessel)
     ship = f"{card.name}, {vessel.length_m:g} m"
     texts = {
@@ -179,7 +181,7 @@ def of_card(name: str, kind: str, card: Card, *, command: str, progress: Progres
 
 def _headed(text: str, title: str) -> str:
     """A template's file, whose first line names another ship."""
-    return "\n".join([f"# {title}", *text.splitlines()[1:], ""])
+    return "\n".join([*toml_comments([title]), *text.splitlines()[1:], ""])
 
 
 def _scaled(text: str, factors: Mapping[str, float]) -> str:
