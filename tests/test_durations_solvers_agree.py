@@ -165,3 +165,20 @@ assert "cvxpy" in sys.modules
 def test_only_final_durations_load_cvxpy():
     """No module does when it is imported, nor does D without limits where it is solved only to compare."""
     subprocess.run([sys.executable, "-c", IMPORTED_WHEN_USED], check=True)
+
+
+@pytest.mark.parametrize("criterion", ["D", "A", "E"])
+def test_problems_of_many_parameters_are_left_to_the_quickest_method(
+    criterion: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The conic solver's work grows by about their sixth power; a twin-screw ship's 44 took it 14 s. E has no other."""
+    size = P + MEANS
+    monkeypatch.setattr(maximise, "CONIC_PARAMETERS", size)
+    task = concave_problem(FEW[f"{criterion}, prior"])
+    stated = maximised(task, as_stated=True)
+    monkeypatch.setattr(maximise, "CONIC_PARAMETERS", size - 1)
+    found = maximised(task, as_stated=True)
+    assert stated.method == CVXPY
+    assert (found.method == CVXPY) == (criterion == "E")
+    assert max(stated.gap, found.gap) < LARGEST_GAP
+    assert found.certificate.value == pytest.approx(stated.certificate.value, abs=2 * size * LARGEST_GAP)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from expdesign.cli import main
+from expdesign.scenario import load_card
 from expdesign.workflows import explain
 from expdesign.workflows.commands.explain import MANUAL, page
 
@@ -58,6 +59,9 @@ def test_a_card_becomes_a_vessel_as_its_page_says(tmp_path: Path, monkeypatch: p
     commands = tutorial("pilot-card")
     commands = [command for command in commands if command[0] not in LONG]
     assert [command[0] for command in commands] == ["explain", "nominal", "nominal", "indices", "new", "durations"]
+    lines = re.findall(r"^ {7}((?:\[|\w+ = ).*)$", (PAGES / "pilot-card.md").read_text(encoding="utf-8"), re.MULTILINE)
+    (tmp_path / "card.toml").write_text("\n".join(lines))
+    assert len(load_card(tmp_path / "card.toml").stated) == 2
     carried_out(commands, tmp_path, monkeypatch)
 
 

@@ -28,6 +28,9 @@ from expdesign.values import Array
 # most candidates of a problem that cvxpy solves as stated, and without a working set. With 18 parameters and 3 means it
 # takes 0.3 s of 14 candidates, 0.9 s of 300, 12 s of 10,000.
 CONIC_CANDIDATES = 300
+# most parameters and means, with which its work grows by about the sixth power: of 8 candidates 24 take 0.2 s, and 44,
+# of a twin-screw ship from a card, 14 s, where other methods take 0.1 s
+CONIC_PARAMETERS = 30
 FLOOR_ROUNDING = 1e-6  # shortfall of a floor, as a logarithm, that counts as rounding
 LARGEST_GAP = 1e-6  # designs with a wider gap are not returned
 
@@ -110,7 +113,8 @@ def _prices(proof: Certificate, names: Sequence[str]) -> Array:
 def _moderate(task: ConcaveProblem) -> bool:
     """Whether cvxpy takes seconds at most."""
     few = len(task.objective.pieces) + len(task.floors) <= CONIC_INEQUALITIES
-    return few and len(task.polytope.least) <= CONIC_CANDIDATES
+    small = len(task.polytope.least) <= CONIC_CANDIDATES and task.objective.dimension <= CONIC_PARAMETERS
+    return few and small
 
 
 def _by_cvxpy(task: ConcaveProblem, kind: str) -> Optimum | None:
