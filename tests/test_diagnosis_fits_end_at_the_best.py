@@ -11,6 +11,7 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.model.terms import term_factors
 from expdesign.diagnosis.motion import fitted_start, stable_windows
 from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.select import forward_selection
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.vessel_file.reading import extended_model
 
@@ -84,6 +85,20 @@ FAR = [
       for ship, seed in (("coaster", 1), ("coaster", 2), ("barge", 1), ("barge", 3), ("tug", 1))),
 ]  # fmt: skip
 """Ship, factors of parameters, seed."""
+
+
+def test_where_another_beginning_runs_away_the_first_answer_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before any cause is tested; one such beginning ended a diagnosis of measured runs that had an answer."""
+    record = hidden_record("barge", seed=3, batches=2, samples=150, relative_std=0.1)
+    ship = extended_model(vessel_of("barge", relative_std=0.1), record)
+    windows = stable_windows(ship, record)
+    away = ship.with_effects({"theta:X_u": 5.0})
+    with pytest.raises(FloatingPointError):
+        fit(away, windows, (), starts=fitted_start(away, windows))
+    best = fit_nuisance(ship, windows, fitted_start(ship, windows))
+    monkeypatch.setattr(forward_selection, "nearer_in_short_windows", lambda *_: away)
+    found = fit_nuisance(ship, windows, fitted_start(ship, windows))
+    assert found.deviance < best.deviance + 2.0
 
 
 @pytest.mark.parametrize(("ship", "factors", "seed"), FAR)

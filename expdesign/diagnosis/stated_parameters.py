@@ -101,7 +101,8 @@ def wrong_parameters(
     """Parameters that stay beyond their standard deviations beside the causes, and gain for certain without them.
 
     None where they return to within them: then they made up for a cause. None, too, where they are another answer than
-    the first cause. Arguments as of `parameters_alone`, and the model in use.
+    the first cause, or where those of the file run away, in windows that re-estimated ones allow. Arguments as of
+    `parameters_alone`, and the model in use.
     """
     alone = parameters_alone(kept, held, validation)
     if alone is None or any(item.candidate.cause == RE_ESTIMATED for item in kept.steps[0].alternatives):
@@ -110,7 +111,10 @@ def wrong_parameters(
     keys = tuple(key for key in beyond_stated_std(kept.last) if key.startswith("theta:") and key not in named)
     if not keys or not shows_for_certain(held[0], alone, seed):
         return None
-    stated = fit(ship.with_known_parameters(), windows, (), starts=kept.first.starts, options=AS_IT_IS)
+    try:
+        stated = fit(ship.with_known_parameters(), windows, (), starts=kept.first.starts, options=AS_IT_IS)
+    except FloatingPointError:
+        return None
     gain = log_likelihood_gain(stated, kept.first)
     chosen = FittedCandidate(
         candidate=Candidate(cause=RE_ESTIMATED, free=dict.fromkeys(keys, 0.0)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -217,8 +218,9 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
         else:
             centre, span = (low + high) / 2, (high - low) / 2 + spacing
     ship, windows = found.ship.with_effects({key: (low + high) / 2}), found.linear.motion.windows
-    at_middle = fit(ship, windows, found.free_keys, starts=found.starts, options=continuing(found))
-    return at_middle, (high - low + spacing) / 2
+    with suppress(FloatingPointError, np.linalg.LinAlgError):  # between likely values: the one that was found stays
+        found = fit(ship, windows, found.free_keys, starts=found.starts, options=continuing(found))
+    return found, (high - low + spacing) / 2
 
 
 def _limits(found: Fit, key: str) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -194,7 +195,8 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
 
     Far from there the remainder overestimates the noise, and any cause that lets the fit continue seems significant.
     Noise that was estimated on the way holds some of what the parameters explain since, as a random current or slow
-    noise that hides causes; so it is estimated from white noise on, too, and the likelier one kept.
+    noise that hides causes; so it is estimated from white noise on, too, and the likelier one kept. What runs away from
+    where else a fit may begin is no answer, and the first one stays.
     """
     found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=NUISANCE_STEPS))
     if not found.keys:
@@ -203,11 +205,12 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
     found = fit(found.ship, windows, (), starts=found.starts, options=options)
     begin = nearer_in_short_windows(ship, windows, found) or found.ship
     anew, afresh = FitOptions(steps=NUISANCE_STEPS, warm_start=found), FitOptions(steps=NUISANCE_STEPS)
-    others = (
-        fit(found.ship, windows, (), starts=found.starts, options=anew),
-        fit(begin, windows, (), starts=fitted_start(begin, windows), options=afresh),
-    )
-    return min(found, *others, key=_deviance)
+    fits = [found]
+    with suppress(FloatingPointError, np.linalg.LinAlgError):
+        fits.append(fit(found.ship, windows, (), starts=found.starts, options=anew))
+    with suppress(FloatingPointError, np.linalg.LinAlgError):
+        fits.append(fit(begin, windows, (), starts=fitted_start(begin, windows), options=afresh))
+    return min(fits, key=_deviance)
 
 
 def _deviance(item: Fit) -> float:
