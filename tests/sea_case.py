@@ -8,7 +8,7 @@ answers what the sensors feel, so that the rudder is correlated with waves and n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +95,10 @@ class Sea:
     wind: Wind = Wind()
 
 
+WINDY_SEAS = {
+    "fresh wind": Sea(wind=FRESH),
+    "fresh wind, measured": Sea(wind=replace(FRESH, measured=True)),
+}
 OTHER_SEAS = {
     "broad spectrum": Sea(broad=True, period_s=8.0),
     "quartering": Sea(together=True, period_s=18.0, wave_radps=np.deg2rad(0.3), wave_mps=0.15),

@@ -37,8 +37,9 @@ UPPER_FACTOR = 2.0  # least ratio of the thresholds
 QUICKER = 3.0  # filters of both variances forget so many times as fast
 DWELL_MEMORIES = 1.0  # time below the lower threshold after which the vessel is steady, in filter memories
 SURROGATES = 40  # of the steady data, to find these quantiles
-# a hold that would do: time constants until a response is over, memories until the filters forget it, and a mean [s]
-SETTLED_CONSTANTS, FORGOTTEN_MEMORIES, MEAN_S = 5.0, 5.0, 10.0
+# a hold that would do: time constants until a response is over, memories until the filters forget it, and a mean of so
+# long [s] and of so many samples
+SETTLED_CONSTANTS, FORGOTTEN_MEMORIES, MEAN_S, MEAN_SAMPLES = 5.0, 5.0, 10.0, 40
 LONGEST_INTERVAL_SHARE = 0.2  # of the filter's memory, between samples of the ratio test
 
 
@@ -62,7 +63,8 @@ class RatioTest:
     @property
     def enough_s(self) -> float:
         """A hold long enough for the response, for the filters to forget it, and for a mean [s]."""
-        return SETTLED_CONSTANTS * self.constant_s + FORGOTTEN_MEMORIES * self.memory_s + MEAN_S
+        mean_s = max(MEAN_S, MEAN_SAMPLES * self.sample_time_s)
+        return SETTLED_CONSTANTS * self.constant_s + FORGOTTEN_MEMORIES * self.memory_s + mean_s
 
     @property
     def interval_s(self) -> float:

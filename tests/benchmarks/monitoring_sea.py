@@ -41,7 +41,20 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from monitoring import DAY, HOUR, gone_on
-from sea_case import CALM, CASES, FRESH, NAMES, OTHER_SEAS, WINDS, Sea, Ship, relative_wind, sailed, vessel_file
+from sea_case import (
+    CALM,
+    CASES,
+    FRESH,
+    NAMES,
+    OTHER_SEAS,
+    WINDS,
+    WINDY_SEAS,
+    Sea,
+    Ship,
+    relative_wind,
+    sailed,
+    vessel_file,
+)
 
 SEAS: tuple[tuple[str, Sea], ...] = (
     ("waves that sensors feel", Sea()),
@@ -225,7 +238,7 @@ if __name__ == "__main__":
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--calm", action="store_true", help="without waves")
     parser.add_argument("--white", action="store_true", help="without a model of the noise in stretches")
-    every = {**dict(SEAS), "calm": CALM, **OTHER_SEAS}
+    every = {**dict(SEAS), "calm": CALM, **OTHER_SEAS, **WINDY_SEAS}
     parser.add_argument("--seas", nargs="+", choices=every)
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--seed", type=int, default=5000, help="the first")
