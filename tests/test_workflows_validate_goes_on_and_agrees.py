@@ -2,7 +2,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import joblib
 import numpy as np
 import pytest
 
@@ -11,9 +10,10 @@ from expdesign.cli import main
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named
 from expdesign.export import words
+from expdesign.memory import digest
 from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
-from expdesign.workflows.commands.validate import _identity, _method
+from expdesign.workflows.commands.validate import _method
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"
@@ -115,4 +115,4 @@ def test_chunks_of_another_ship_are_not_taken_over():
         )
         for ship in ships
     )  # fmt: skip
-    assert len({joblib.hash(_identity(one)) for one in rehearsals}) == len(ships)
+    assert len({digest(one) for one in rehearsals}) == len(ships)

@@ -6,16 +6,15 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import joblib
 import numpy as np
 
 from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
-from expdesign.export.files import vessel_toml
 from expdesign.export.folder import Content
 from expdesign.export.validation_page import judgements, validation_document, validation_json
 from expdesign.information import estimated_parameters
+from expdesign.memory import digest
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import Scenario, load_scenario, load_vessel
@@ -63,7 +62,7 @@ def validate_design(request: requests.Validate, *, progress: Progress = silent) 
         seed=request.seed,
     )
     folder = request.out or Path("runs") / case.name
-    done, keep, forget = _chunk_store(folder / f".validation-{joblib.hash(_identity(rehearsal))}")
+    done, keep, forget = _chunk_store(folder / f".validation-{digest(__version__, rehearsal)}")
     with shared(request, load=None):
         results = validate(rehearsal, done=done, keep=keep, progress=within(progress, 0.05, 0.95))
     noisy = [
@@ -88,22 +87,6 @@ def _method(case: Scenario, stated: str | None) -> str:
     else:
         usual = steady_current_method(case.vessel.model) if case.environment.current_std_mps > 0 else "iv"
     return stated or usual
-
-
-def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
-    """Everything that the trials depend on."""
-    arrays = [(item.name, item.commands.values, item.entry_velocity) for item in rehearsal.primitives]
-    ships = [vessel_toml(ship) for ship in (rehearsal.truth, rehearsal.nominal)]
-    weather = rehearsal.environment
-    return (
-        __version__,
-        arrays,
-        ships,
-        (weather.current_to, weather.current_std_mps, weather.wind_to, weather.wind_std_mps),
-        (weather.current_variation, weather.wind_variation),
-        (dict(rehearsal.designs), rehearsal.total_s, rehearsal.parameters, rehearsal.method),
-        (rehearsal.mean_subtraction, rehearsal.excitation, rehearsal.integrator, rehearsal.trials, rehearsal.seed),
-    )
 
 
 def _chunk_store(folder: Path) -> tuple[dict[str, Array], Callable[[str, Array], None], Callable[[], None]]:
