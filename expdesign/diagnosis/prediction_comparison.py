@@ -20,7 +20,6 @@ import scipy
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
-    Dispersion,
     Fit,
     FitOptions,
     HeldOut,
@@ -32,7 +31,6 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
     no_smaller,
     on_common_units,
-    spread_between_runs,
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states
@@ -46,6 +44,7 @@ from expdesign.diagnosis.select import (
     score_tests,
     starting_point,
 )
+from expdesign.estimation.solve import Dispersion, spread_between_runs
 from expdesign.processes import in_order
 from expdesign.progress import Progress
 from expdesign.values import Array

@@ -59,7 +59,3 @@ from expdesign.diagnosis.fit.linear_model import (
     window_information,
 )
 from expdesign.diagnosis.fit.output_error import AHEAD_S, fit_ahead, fit_output_error, no_smaller, with_longer_windows
-from expdesign.estimation.solve import Dispersion as Dispersion
-from expdesign.estimation.solve import Spread as Spread
-from expdesign.estimation.solve import few_runs_factor as few_runs_factor
-from expdesign.estimation.solve import spread_between_runs as spread_between_runs

@@ -14,7 +14,6 @@ from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
     CrossValidation,
-    Dispersion,
     Fit,
     FitOptions,
     HeldOut,
@@ -24,7 +23,6 @@ from expdesign.diagnosis.fit import (
     deviations_of,
     directions_between_runs,
     effect_disturbances,
-    few_runs_factor,
     fit,
     gram_matrices,
     held_out_gain,
@@ -54,6 +52,7 @@ from expdesign.diagnosis.select import (
     redundant_step,
     without_step,
 )
+from expdesign.estimation.solve import Dispersion, few_runs_factor
 from expdesign.values import Array
 from expdesign.vessel import Term
 

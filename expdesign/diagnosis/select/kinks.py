@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.fit import Dispersion, Fit, continuing, few_runs_factor, fit, marginalised, profile_cost
+from expdesign.diagnosis.fit import Fit, continuing, fit, marginalised, profile_cost
 from expdesign.diagnosis.select.selection import Selection
+from expdesign.estimation.solve import Dispersion, few_runs_factor
 from expdesign.values import Array
 from expdesign.vessel.quantities import EFFECTS
 

@@ -25,9 +25,7 @@ from scipy.linalg.lapack import dtbtrs
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import (
     NOISE_ALONE,
-    Dispersion,
     Fit,
-    Spread,
     build_sensitivities,
     deviations_of,
     difference_step,
@@ -42,6 +40,7 @@ from expdesign.diagnosis.fit import (
 )
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.estimation.solve import Dispersion, Spread
 from expdesign.values import Array
 
 DRAWS = 2000  # of the null distribution, for adjusted p-values

@@ -12,12 +12,10 @@ from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
     NOISE_ALONE,
-    Dispersion,
     Fit,
     FitOptions,
     continuing,
     counting_runs,
-    few_runs_factor,
     fit,
     fit_ahead,
     log_likelihood_gain,
@@ -28,6 +26,7 @@ from expdesign.diagnosis.fit import (
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
 from expdesign.diagnosis.select.score_tests import ScoreTest, scored_between_runs
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.estimation.solve import Dispersion, few_runs_factor
 
 SHAPE = ("roll:period", "roll:damping")
 """Effects that describe the kind of an oscillation, not its size."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
-from expdesign.export.folder import Content
+from expdesign.export.folder import Content, write_files
 from expdesign.export.validation_page import judgements, validation_document, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.memory import digest
@@ -94,11 +95,8 @@ def _chunk_store(folder: Path) -> tuple[dict[str, Array], Callable[[str, Array],
     done = {path.stem.replace("+", "/"): np.load(path) for path in sorted(folder.glob("*.npy"))}
 
     def keep(key: str, rows: Array) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
-        target = folder / f"{key.replace('/', '+')}.npy"
-        beside = target.with_suffix(".part")
-        with beside.open("wb") as file:
-            np.save(file, rows)
-        beside.replace(target)
+        content = io.BytesIO()
+        np.save(content, rows)
+        write_files(folder, {f"{key.replace('/', '+')}.npy": content.getvalue()})
 
     return done, keep, lambda: shutil.rmtree(folder, ignore_errors=True)

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -213,21 +214,11 @@ def _shortest_of(
     return min(days, key=lambda day: np.nan_to_num(day.plan.day.median_s, nan=np.inf))
 
 
-def _answered(
-    memory: Memory | None,
-    case: Scenario,
-    information: tuple[PrimitiveInformation, ...],
-    design: DurationDesign,
-    accuracy: Accuracy,
-    stated: VesselModel | None,
-    seed: int,
-    start: int,
-    progress: Progress,
-) -> Day | NoAnswer:
-    """The outcome of one search, perhaps in another process."""
+def _answered(memory: Memory | None, *asked: Any) -> Day | NoAnswer:
+    """The outcome of one search, of what `_searched` is asked, perhaps in another process."""
     with remembering(memory):
         try:
-            return _searched(case, information, design, accuracy, stated, seed, start, progress)
+            return _searched(*asked)
         except NoAnswer as error:
             return error
 
