@@ -139,6 +139,33 @@ def test_a_sway_in_knots_is_named_beside_the_place_that_it_looks_like(tmp_path: 
     assert "v_mps is" not in findings(tmp_path, moved(voyages(1, "random")[0]), ship)["position_forward_m"].text
 
 
+@pytest.mark.parametrize("noise_mps", [0.0, 0.03, 0.06])
+@pytest.mark.parametrize("scale", [1.0, 0.87, 1.15])
+def test_noise_of_a_sway_that_follows_the_turn_is_not_taken_for_its_scale(scale: float, noise_mps: float) -> None:
+    """Beside an antenna's place only the beginnings of turns tell that scale; regression makes it small by noise."""
+    told = []
+    for seed in range(3):
+        rng, t = np.random.default_rng(seed), np.arange(10_800.0)
+        turn, r, v = np.repeat(rng.choice([-0.02, -0.01, 0.0, 0.01, 0.02], 90), 120), np.zeros_like(t), np.zeros_like(t)
+        for k in range(len(t) - 1):
+            r[k + 1] = r[k] + (turn[k] - r[k]) / 5.0
+            v[k + 1] = v[k] + (-20.0 * r[k] - v[k]) / 5.0
+        heading = np.concatenate([[0.0], np.cumsum((r[1:] + r[:-1]) / 2.0)])
+        way = (6.5 + 1j * v) * np.exp(1j * heading)
+        place = np.concatenate([[0.0], np.cumsum((way[1:] + way[:-1]) / 2.0)])
+        seen = np.column_stack([np.full_like(t, 6.5), scale * v, r])
+        seen[:, :2] += noise_mps * rng.standard_normal((len(t), 2))
+        at = np.column_stack([place.real, place.imag]) + 0.05 * rng.standard_normal((len(t), 2))
+        batch = Batch(
+            name="log", sample_time_s=1.0, input_names=(), inputs=np.zeros((len(t), 0)), velocity=seen,
+            pose=np.column_stack([at, heading]),
+        )  # fmt: skip
+        told += list(log_against_positions([batch], length_m=60.0))
+    assert {finding.name for finding in told} <= ({"sway_scale"} if scale != 1.0 else set())
+    assert all(abs(finding.value - scale) < 4.0 * finding.std for finding in told)
+    assert noise_mps or scale == 1.0 or len(told) == 3
+
+
 ALIKE_IN_A_CIRCLE = "surge_scale", "velocity_delay_s", "position_delay_s"
 """In a steady turn axes, clocks and places look alike."""
 

@@ -34,6 +34,7 @@ TURN_MATTERS_RAD = 0.0175  # misalignment that is told [rad]
 RATE_MATTERS = 0.1  # bias of a rate, as a share of its root mean square, that is told
 PLACE_STD = 0.001  # standard error of a place, at least, in ship lengths: small differences of clocks imitate that
 PLACE_MATTERS = 0.05  # distance of an instrument, in ship lengths, that is told
+LEAST_TRUE = 0.2  # share of a way that is no noise from which its scale is known at all
 ALIKE = 1.05  # what an explanation may leave, by what another one leaves, to be named beside it
 DELAY_MATTERS = 0.6  # of one instrument after another, in samples, that is told; Euler's map alone gives a half
 DELAY_STD = 0.05  # standard error of a delay, at least, in samples
@@ -147,11 +148,26 @@ class _Log:
     # the same with a scale of sway of its own, which is not certainly another; None where nothing tells
     apart: _Log | None = None
     placed: _Log | None = None  # with that scale in place of another place of the positions
+    # share of the way to the side, beyond what the others explain, that is no white noise of the measured sway
+    true_share: float = 1.0
 
     def of(self, name: str) -> tuple[complex, Array]:
         """Coefficient of a regressor, and the standard errors of its parts."""
         place = self.names.index(name)
         return complex(self.ahead.others[place]), self.ahead.others_std[place]
+
+    @property
+    def side(self) -> tuple[float, float]:
+        """Least and greatest scale of sway: regression makes it smaller by the share of it that is noise."""
+        value = self.of("side")[0].real
+        return value, value / self.true_share
+
+    @property
+    def side_scale(self) -> tuple[float, float]:
+        """Measured over true sway speed, and its standard error with half the distance of both bounds."""
+        (low, high), spread = self.side, self.of("side")[1][0]
+        side, std = (low + high) / 2.0, float(np.hypot(spread, (high - low) / 2.0))
+        return 1.0 / side, std / side**2
 
     def delay_std(self, name: str) -> float:
         """Standard error of a delay [s], with what sampling leaves open."""
@@ -172,11 +188,15 @@ def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
         running = [_columns(batch, late_s) for batch in batches]
         wide = [np.column_stack([rows[name] for name in ("position", x, *names)]) for rows in running]
         found = relation(stretches(batches, wide, length_m=length_m), told=TOLD_WAY)
-        return (
-            None
-            if found is None
-            else _Log(ahead=found, names=tuple(names), sample_s=batches[0].sample_time_s, late_s=late_s)
-        )
+        if found is None:
+            return None
+        share = 1.0
+        if "side" in names:
+            place = 2 + list(names).index("side")
+            share = _true_share([np.roll(rows[:, 1:], 1 - place, axis=1) for rows in wide], batches, length_m=length_m)
+            if share < LEAST_TRUE:
+                return None
+        return _Log(ahead=found, names=tuple(names), sample_s=batches[0].sample_time_s, late_s=late_s, true_share=share)
 
     optional = ("side", "positions", "log")
     found = _certain(related, optional) if batches else None
@@ -188,6 +208,25 @@ def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
     if found is None or "side" in found.names:
         return found
     return replace(found, apart=related((*found.names, "side")), placed=related(("drift", "side")))
+
+
+def _true_share(running: Sequence[Array], batches: Sequence[Batch], *, length_m: float) -> float:
+    """Share of the way to the side, beyond what other ways explain, that is no white noise of the measured sway.
+
+    Args:
+        running: (k, n) the way to the side and the others, of every batch.
+        batches: whose sway it is.
+        length_m: of the ship.
+    """
+    ways = np.concatenate(stretches(batches, running, length_m=length_m))
+    rest = ways[:, 0] - ways[:, 1:] @ np.linalg.lstsq(ways[:, 1:], ways[:, 0], rcond=1e-9)[0]
+    noise = [
+        (np.nanmean(np.diff(batch.velocity[:, 1], 2) ** 2) / 6.0 * batch.sample_time_s**2 * window, len(batch))
+        for batch in batches
+        if len(batch) > (window := _window(batch, length_m))
+    ]
+    white = np.average([size for size, _ in noise], weights=[count for _, count in noise])
+    return float(1.0 - white / max(np.mean(np.abs(rest) ** 2), 1e-300))
 
 
 def _certain(related: Callable[[Sequence[str]], _Log | None], optional: Sequence[str]) -> _Log | None:
@@ -206,10 +245,11 @@ def _certainty(found: _Log, name: str) -> float:
     """Size of a coefficient of its own, in those that are told."""
     value, spread = found.of(name)
     if name == "side":
-        share = value.real / abs(found.ahead.ratio)
-        if not 1.0 / SWAY_WITHIN < share < SWAY_WITHIN:  # the noise of a log that hardly drifts, or none
+        ahead = abs(found.ahead.ratio)
+        if not 1.0 / SWAY_WITHIN < value.real / ahead < SWAY_WITHIN:  # the noise of a log that hardly drifts, or none
             return 0.0
-        apart = abs(value - found.ahead.ratio)
+        low, high = (bound - ahead for bound in found.side)
+        apart = min(abs(low), abs(high)) if low * high > 0 else 0.0
         return float(apart / max(CERTAIN * np.hypot(spread[0], found.ahead.std[0]), SCALE_MATTERS))
     delay_s = abs(value.real + found.late_s * (name == "log"))
     return float(delay_s / max(CERTAIN * found.delay_std(name), DELAY_MATTERS * found.sample_s))
@@ -222,8 +262,7 @@ def _log_scale(found: _Log) -> Iterator[Finding]:
         return
     whole = found.ahead
     scale, std = 1.0 / whole.size, whole.size_std / whole.size**2
-    side, spread = found.of("side")
-    axes = (("surge", "u_mps", scale, std), ("sway", "v_mps", 1.0 / side.real, spread[0] / side.real**2))
+    axes = (("surge", "u_mps", scale, std), ("sway", "v_mps", *found.side_scale))
     for axis, column, value, error in axes:
         error = float(np.hypot(error, SCALE_STD))
         if abs(value - 1.0) > max(CERTAIN * error, SCALE_MATTERS):
@@ -260,10 +299,11 @@ def _one_scale(found: _Log) -> Iterator[Finding]:
 
 def _sway_is_right(apart: _Log) -> tuple[bool, bool]:
     """Whether a scale of one is excluded for sway, and whether sway's is nearer to one than to that of surge."""
-    side, spread = apart.of("side")
-    plain = 1.0 / SWAY_WITHIN < side.real < SWAY_WITHIN  # not the noise of a log that hardly drifts
-    excluded = plain and abs(side.real - 1.0) > CERTAIN * spread[0]
-    return excluded, bool(plain and not excluded and abs(side.real - 1.0) < abs(side.real - abs(apart.ahead.ratio)))
+    (low, high), spread = apart.side, apart.of("side")[1][0]
+    side = (low + high) / 2.0
+    plain = 1.0 / SWAY_WITHIN < low < SWAY_WITHIN  # not the noise of a log that hardly drifts
+    excluded = plain and (low - 1.0 > CERTAIN * spread or 1.0 - high > CERTAIN * spread)
+    return excluded, bool(plain and not excluded and abs(side - 1.0) < abs(side - abs(apart.ahead.ratio)))
 
 
 def _clocks(found: _Log) -> Iterator[Finding]:
@@ -307,8 +347,7 @@ def _sway_alike(found: _Log) -> str:
     other = found.placed
     if other is None or other.ahead.rest > ALIKE * found.ahead.rest:
         return ""
-    side, spread = other.of("side")
-    scale, std = 1.0 / side.real, spread[0] / side.real**2
+    scale, std = other.side_scale
     if abs(scale - 1.0) < max(CERTAIN * std, SCALE_MATTERS):
         return ""
     return f", or v_mps is {plus_minus(scale, std)} times the sway speed that the positions give"
