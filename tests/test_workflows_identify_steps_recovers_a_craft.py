@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -75,6 +76,9 @@ def test_the_page_and_the_summary_speak_of_the_same_steps(results: Path) -> None
     found = json.loads((results / "step-model.json").read_text())
     assert all(remark.split(" \N{PLUS-MINUS SIGN}")[0] in page for remark in found["remarks"][:3])
     assert "http" not in page.replace("http://www.w3.org", "")
+    told = re.findall(r"-?\d+(\.\d+)? \N{PLUS-MINUS SIGN} \d+(\.\d+)?", page)
+    assert len(told) > 20
+    assert all(len(value) == len(std) for value, std in told)  # as many decimals as the error
 
 
 @pytest.mark.thorough

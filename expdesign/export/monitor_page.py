@@ -143,7 +143,7 @@ def statistic_figure(content: MonitorContent) -> str:
     axes.set_ylim(0, None)
     axes.set_xlabel(label)
     axes.set_ylabel("log-likelihood ratio")
-    axes.legend(loc="upper left", fontsize=9)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=9, frameon=False)  # beside the threshold
     light_grid(axes)
     return svg(figure, key="statistic", label="Statistic of the watch over time, with its threshold")
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.conventions import plus_minus
 from expdesign.export.document import Table
 from expdesign.export.files import finite, named_finite, strict_json
 from expdesign.export.words import counted
@@ -144,13 +145,9 @@ def _currents(content: StepTrialContent) -> Iterator[str]:
     trial = content.trial
     for batch, one in zip(trial.batches, trial.currents, strict=False):
         if one is not None:
-            apart, size, std = (
-                "\N{PLUS-MINUS SIGN}",
-                float(np.hypot(*one.to_mps)),
-                math.sqrt(float(np.trace(one.covariance)) / 2),
-            )
+            size, std = float(np.hypot(*one.to_mps)), math.sqrt(float(np.trace(one.covariance)) / 2)
             to = round(math.degrees(math.atan2(one.to_mps[1], one.to_mps[0]))) % 360
-            about = f"{size:.2f} {apart} {max(std, 0.001):.1g} m/s"
+            about = f"{plus_minus(size, max(std, 0.001))} m/s"
             yield (
                 f"{batch.name}: turns show a current of {about} to {to} degrees, "
                 "which is taken off: U is the speed through the water."
@@ -161,7 +158,7 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
     significant = [one for one in content.trial.found if one.p_value < SIGNIFICANT]
     for one in significant:
         own = command_units(content)[CHANNELS.index(one.command)] or f"of the {one.command}"
-        size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} {own}"
+        size = f"{plus_minus(abs(one.difference), one.std)} {own}"
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
         if one.kind == "hysteresis":
             unit = STATE_UNITS[CHANNELS.index(one.command)]
@@ -220,7 +217,7 @@ def _step_row(content: StepTrialContent, one: StepSample) -> tuple[str, ...]:
         if response is None
         else f"{response.time_constant_s:.2f} \N{PLUS-MINUS SIGN} {constant_std_s(content, one):.2f} s"
     )
-    mass = f"{one.inertia:.3g} \N{PLUS-MINUS SIGN} {one.inertia_std:.1g}" if math.isfinite(one.inertia) else ""
+    mass = plus_minus(one.inertia, one.inertia_std) if math.isfinite(one.inertia) else ""
     remarks = "; ".join((*one.problems, *one.remarks))
     return (
         str(one.hold.number), _to(one, 0), _to(one, 1), "" if one.steady_s is None else f"{one.steady_s:.0f} s", *state,
@@ -242,7 +239,7 @@ def nominal_table(content: StepTrialContent) -> Table:
 
 
 def _pair(value: float, std: float) -> str:
-    return f"{value:.4g} \N{PLUS-MINUS SIGN} {std:.2g}" if std > 0 else f"{value:.4g}, known"
+    return plus_minus(value, std) if std > 0 else f"{value:.4g}, known"
 
 
 def step_model_json(content: StepTrialContent) -> str:

@@ -197,6 +197,9 @@ def coverage_figure(content: StepTrialContent) -> str:
     return svg(figure, key="coverage", label="Steady states and steps in the plane of speed and yaw rate")
 
 
+STATES = ("speed U [m/s]", "yaw rate r [rad/s]")
+
+
 @page_figure
 def surface_figure(content: StepTrialContent) -> str:
     """Both dampings and both inertias: measured, and by the model at the same places."""
@@ -210,7 +213,7 @@ def surface_figure(content: StepTrialContent) -> str:
         given = np.array([one.hold.commands[channel] for one, _ in steady])
         _against(axes[0, place], states, given, damping, f"damping = steady {name}", channel)
         own = [one for one in trial.samples if one.hold.channel == channel]
-        _inertia(axes[1, place], own, inertia, f"inertia to {name}")
+        _inertia(axes[1, place], own, inertia, f"inertia to {name}", channel)
         if unit:
             axes[0, place].set_ylabel(f"{name} [{unit}]")
             axes[1, place].set_ylabel(f"[{unit} per {('m/s²', 'rad/s²')[channel]}]")
@@ -221,27 +224,29 @@ def _against(axes: Axes, states: Array, values: Array, surface: Surface, title: 
     axes.plot(states[:, channel], values, "o", color=BLUE, markersize=4, label="measured")
     axes.plot(states[:, channel], surface(states), "x", color=VERMILION, markersize=4, label="model")
     axes.set_title(title)
-    axes.set_xlabel(("speed U [m/s]", "yaw rate r [rad/s]")[channel])
+    axes.set_xlabel(STATES[channel])
     axes.legend(loc="best", fontsize=8)
     light_grid(axes)
 
 
-def _inertia(axes: Axes, samples: list[StepSample], surface: Surface, title: str) -> None:
+def _inertia(axes: Axes, samples: list[StepSample], surface: Surface, title: str, channel: int) -> None:
     good = [one for one in samples if one.counts]
     bad = [one for one in samples if not one.counts and np.isfinite(one.inertia) and one.plateau and one.before]
     places = np.array([one.location for one in good])
     error = [one.inertia_std for one in good]
     values = np.array([one.inertia for one in good])
-    axes.errorbar(places[:, 0], values, error, fmt="o", color=BLUE, markersize=4, label="measured")
-    axes.plot(places[:, 0], surface(places), "x", color=VERMILION, markersize=4, label="model")
+    axes.errorbar(places[:, channel], values, error, fmt="o", color=BLUE, markersize=4, label="measured")
+    axes.plot(places[:, channel], surface(places), "x", color=VERMILION, markersize=4, label="model")
     top = 1.3 * float(values.max())
     shown = [one for one in bad if 0 < one.inertia < top]
     if shown:
         left_out = np.array([one.location for one in shown])
-        axes.plot(left_out[:, 0], [one.inertia for one in shown], "o", color=GREY, fillstyle="none", label="left out")
+        axes.plot(
+            left_out[:, channel], [one.inertia for one in shown], "o", color=GREY, fillstyle="none", label="left out"
+        )
     axes.set_ylim(0, top)
     axes.set_title(title)
-    axes.set_xlabel("speed U [m/s]")
+    axes.set_xlabel(STATES[channel])
     axes.legend(loc="best", fontsize=8)
     light_grid(axes)
 
