@@ -41,10 +41,17 @@ LARGEST = {"surge": 50.0, "sway": 20.0, "yaw": 5.0}
 """Kind of a velocity -> largest size that a setting of it may have [m/s, m/s, rad/s]."""
 
 
-def velocity(kind: str, name: str, meaning: str, *, default: float | None = None, signed: bool = True) -> Setting:
+def velocity_setting(
+    kind: str, name: str, meaning: str, *, default: float | None = None, signed: bool = True
+) -> Setting:
     """A velocity, or the size of one; positive ahead and to starboard."""
     most = LARGEST[kind]
     return Setting(name=name, meaning=meaning, default=default, low=-most if signed else 0.0, high=most, searched=kind)
+
+
+def share_setting(name: str, meaning: str, *, default: float, low: float = 0.0, high: float = 1.0) -> Setting:
+    """A share of the run, or of the engine order for full ahead."""
+    return Setting(name=name, meaning=meaning, default=default, low=low, high=high, searched="share")
 
 
 Reference = Callable[[Mapping[str, float], Array], Array]

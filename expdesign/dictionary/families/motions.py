@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting, velocity
+from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting, share_setting, velocity_setting
 from expdesign.errors import InputError
 from expdesign.values import Array
 
@@ -23,14 +23,7 @@ LEAST_SWING = 0.5  # least amplitude to both sides of a wave before it is scaled
 
 # Smooth shapes of reference motions: without jumps, because actuators have rate limits.
 
-RAMP_FRACTION = Setting(
-    name="ramp_fraction",
-    meaning="share of the run that the change takes",
-    default=0.7,
-    low=0.01,
-    high=1,
-    searched="share",
-)
+RAMP_FRACTION = share_setting("ramp_fraction", "share of the run that the change takes", default=0.7, low=0.01)
 
 
 def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:
@@ -82,8 +75,8 @@ ACCELERATION = Family(
     summary="from a lower to a higher surge speed on a straight course",
     settings=(
         DURATION,
-        velocity("surge", "speed_mps", "surge speed reached"),
-        velocity("surge", "from_speed_mps", "surge speed at the start", default=0.0),
+        velocity_setting("surge", "speed_mps", "surge speed reached"),
+        velocity_setting("surge", "from_speed_mps", "surge speed at the start", default=0.0),
         RAMP_FRACTION,
     ),
     reference=_reference_acceleration,
@@ -100,8 +93,8 @@ DECELERATION = Family(
     summary="from a surge speed down to a lower one, or to rest, on a straight course",
     settings=(
         DURATION,
-        velocity("surge", "speed_mps", "surge speed at the start"),
-        velocity("surge", "to_speed_mps", "surge speed reached", default=0.0),
+        velocity_setting("surge", "speed_mps", "surge speed at the start"),
+        velocity_setting("surge", "to_speed_mps", "surge speed reached", default=0.0),
         RAMP_FRACTION,
     ),
     reference=_reference_deceleration,
@@ -119,9 +112,9 @@ INWARD_SPIRAL = Family(
     summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
     settings=(
         DURATION,
-        velocity("surge", "speed_mps", "surge speed"),
-        velocity("yaw", "yaw_rate_radps", "yaw rate at the end, positive to starboard"),
-        velocity("sway", "sway_mps", "sway speed, positive to starboard", default=0.0),
+        velocity_setting("surge", "speed_mps", "surge speed"),
+        velocity_setting("yaw", "yaw_rate_radps", "yaw rate at the end, positive to starboard"),
+        velocity_setting("sway", "sway_mps", "sway speed, positive to starboard", default=0.0),
         Setting(
             name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4, searched="time"
         ),
@@ -151,10 +144,10 @@ MULTISINE = Family(
     settings=(
         WHOLE_PERIODS,
         Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
-        velocity("surge", "speed_mps", "mean surge speed"),
-        velocity("surge", "speed_swing_mps", "amplitude of surge speed", default=0.0, signed=False),
-        velocity("sway", "sway_mps", "largest sway speed", default=0.0),
-        velocity("yaw", "yaw_rate_radps", "largest yaw rate", default=0.0),
+        velocity_setting("surge", "speed_mps", "mean surge speed"),
+        velocity_setting("surge", "speed_swing_mps", "amplitude of surge speed", default=0.0, signed=False),
+        velocity_setting("sway", "sway_mps", "largest sway speed", default=0.0),
+        velocity_setting("yaw", "yaw_rate_radps", "largest yaw rate", default=0.0),
     ),
     reference=_reference_multisine,
 )
@@ -171,17 +164,10 @@ SWAY_STEP = Family(
     summary="a step of sway speed on a steady heading, and back",
     settings=(
         DURATION,
-        velocity("sway", "sway_mps", "sway speed, positive to starboard"),
+        velocity_setting("sway", "sway_mps", "sway speed, positive to starboard"),
         Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
-        velocity("surge", "speed_mps", "surge speed", default=0.0),
-        Setting(
-            name="held_fraction",
-            meaning="share of the run after which the sway returns to zero",
-            default=0.6,
-            low=0.05,
-            high=1,
-            searched="share",
-        ),
+        velocity_setting("surge", "speed_mps", "surge speed", default=0.0),
+        share_setting("held_fraction", "share of the run after which the sway returns to zero", default=0.6, low=0.05),
     ),
     reference=_reference_sway_step,
 )
@@ -198,9 +184,9 @@ SWAY_ZIGZAG = Family(
     summary="alternating sideways motion on a steady heading, with or without headway",
     settings=(
         WHOLE_PERIODS,
-        velocity("sway", "sway_mps", "largest sway speed; the first push is to starboard"),
+        velocity_setting("sway", "sway_mps", "largest sway speed; the first push is to starboard"),
         Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
-        velocity("surge", "speed_mps", "surge speed", default=0.0),
+        velocity_setting("surge", "speed_mps", "surge speed", default=0.0),
     ),
     reference=_reference_sway_zigzag,
 )
@@ -232,15 +218,15 @@ TELEGRAPH = Family(
     summary="random switching of surge speed, sway speed and yaw rate between two levels each",
     settings=(
         DURATION,
-        velocity("surge", "speed_mps", "mean surge speed"),
-        velocity("surge", "speed_swing_mps", "amplitude of surge speed", signed=False),
-        velocity("sway", "sway_mps", "sway speed to both sides", signed=False),
-        velocity("yaw", "yaw_rate_radps", "yaw rate to both sides", signed=False),
+        velocity_setting("surge", "speed_mps", "mean surge speed"),
+        velocity_setting("surge", "speed_swing_mps", "amplitude of surge speed", signed=False),
+        velocity_setting("sway", "sway_mps", "sway speed to both sides", signed=False),
+        velocity_setting("yaw", "yaw_rate_radps", "yaw rate to both sides", signed=False),
         Setting(name="hold_s", meaning="mean time between switches", low=1e-2, high=1e5, searched="time"),
         Setting(name="rise_s", meaning="time that a switch takes", low=1e-2, high=1e4, searched="time"),
         Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
-        velocity("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
-        velocity("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
+        velocity_setting("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
+        velocity_setting("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
     ),
     reference=_reference_telegraph,
 )
@@ -257,11 +243,11 @@ TURNING_CIRCLE = Family(
     summary="a turn to one side from a straight approach to a steady yaw rate, drifting outwards",
     settings=(
         DURATION,
-        velocity("surge", "speed_mps", "approach speed"),
-        velocity("surge", "turn_speed_mps", "surge speed in the turn"),
-        velocity("yaw", "yaw_rate_radps", "yaw rate in the turn, positive to starboard"),
+        velocity_setting("surge", "speed_mps", "approach speed"),
+        velocity_setting("surge", "turn_speed_mps", "surge speed in the turn"),
+        velocity_setting("yaw", "yaw_rate_radps", "yaw rate in the turn, positive to starboard"),
         Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4, searched="time"),
-        velocity("sway", "sway_mps", "outward sway, positive to port", default=0.0),
+        velocity_setting("sway", "sway_mps", "outward sway, positive to port", default=0.0),
     ),
     reference=_reference_turning_circle,
 )
@@ -280,12 +266,12 @@ ZIGZAG = Family(
     summary="alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns",
     settings=(
         WHOLE_PERIODS,
-        velocity("surge", "speed_mps", "surge speed"),
-        velocity("yaw", "yaw_rate_radps", "largest yaw rate; the first turn is to starboard"),
+        velocity_setting("surge", "speed_mps", "surge speed"),
+        velocity_setting("yaw", "yaw_rate_radps", "largest yaw rate; the first turn is to starboard"),
         Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
-        velocity("sway", "sway_mps", "largest outward sway speed", default=0.0),
-        velocity("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
-        velocity("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
+        velocity_setting("sway", "sway_mps", "largest outward sway speed", default=0.0),
+        velocity_setting("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
+        velocity_setting("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
     ),
     reference=_reference_zigzag,
 )

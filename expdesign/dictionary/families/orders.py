@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting, share_setting
 from expdesign.dictionary.trim import hold
 from expdesign.errors import InputError
 from expdesign.signals import Commands
@@ -23,6 +23,9 @@ from expdesign.vessel import Vessel, within_limits
 # Engine and helm orders from a steady straight approach, for families defined by commands.
 
 APPROACH = Setting(name="speed_mps", meaning="approach speed, more than 0", low=1e-6, high=50, searched="surge")
+HELM_OFFSET = Setting(
+    name="helm_offset_rad", meaning="steady helm added to it", default=0.0, low=-1.5, high=1.5, searched="helm"
+)
 HALF_TURN = np.pi / 2
 
 
@@ -102,14 +105,11 @@ CRASH_STOP = Family(
     settings=(
         DURATION,
         APPROACH,
-        Setting(name="astern", meaning="engine order, 1 for full astern", default=1.0, low=0, high=1, searched="share"),
-        Setting(
-            name="astern_fraction",
-            meaning="share of the run that engines go astern; 0 for until the nominal ship lies still",
+        share_setting("astern", "engine order, 1 for full astern", default=1.0),
+        share_setting(
+            "astern_fraction",
+            "share of the run that engines go astern; 0 for until the nominal ship lies still",
             default=0.0,
-            low=0,
-            high=1,
-            searched="share",
         ),
     ),
     orders=_orders_crash_stop,
@@ -152,14 +152,7 @@ PULL_OUT = Family(
         DURATION,
         APPROACH,
         helm_setting("helm in the turn, positive to starboard", default=float(np.radians(20.0))),
-        Setting(
-            name="turn_fraction",
-            meaning="share of the run with the helm over",
-            default=0.5,
-            low=0.05,
-            high=0.95,
-            searched="share",
-        ),
+        share_setting("turn_fraction", "share of the run with the helm over", default=0.5, low=0.05, high=0.95),
     ),
     orders=helm_family(_helm_pull_out),
 )
@@ -227,17 +220,10 @@ STEPS = Family(
         APPROACH,
         helm_setting("largest helm to both sides"),
         Setting(name="hold_s", meaning="mean time between steps", low=1e-2, high=1e5, searched="time"),
-        Setting(
-            name="engine_swing",
-            meaning="largest change of the engine order, as a share of full ahead",
-            default=0.0,
-            low=0,
-            high=2,
-            searched="share",
+        share_setting(
+            "engine_swing", "largest change of the engine order, as a share of full ahead", default=0.0, high=2
         ),
-        Setting(
-            name="helm_offset_rad", meaning="steady helm added to it", default=0.0, low=-1.5, high=1.5, searched="helm"
-        ),
+        HELM_OFFSET,
         Setting(
             name="levels",
             meaning="number of even levels from one side to the other, a whole number: 2 for hard to hard; 0 for any",

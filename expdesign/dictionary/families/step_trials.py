@@ -19,8 +19,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import scipy
 
-from expdesign.dictionary.families.orders import APPROACH, HALF_TURN, helm_setting, ordered, run_times, steered
-from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
+from expdesign.dictionary.families.orders import (
+    APPROACH,
+    HALF_TURN,
+    HELM_OFFSET,
+    helm_setting,
+    ordered,
+    run_times,
+    steered,
+)
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting, share_setting
 from expdesign.errors import InputError
 from expdesign.simulation.helm import Approach, steady_ahead
 from expdesign.values import Array
@@ -51,18 +59,9 @@ HELM_AND_ENGINE_WAVES = Family(
         APPROACH,
         helm_setting("amplitude of the helm; positive begins to starboard"),
         Setting(name="helm_period_s", meaning="period of the helm", low=1e-2, high=1e4, searched="time"),
-        Setting(
-            name="engine_swing",
-            meaning="amplitude of the engine order, as a share of full ahead",
-            default=0.0,
-            low=0,
-            high=0.5,
-            searched="share",
-        ),
+        share_setting("engine_swing", "amplitude of the engine order, as a share of full ahead", default=0.0, high=0.5),
         Setting(name="engine_period_s", meaning="period of the engine order", low=1e-2, high=1e4, searched="time"),
-        Setting(
-            name="helm_offset_rad", meaning="steady helm added to it", default=0.0, low=-1.5, high=1.5, searched="helm"
-        ),
+        HELM_OFFSET,
     ),
     orders=_orders_helm_and_engine_waves,
 )
