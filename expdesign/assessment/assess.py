@@ -175,9 +175,7 @@ def with_unstated(
     Where none is among its methods, one is made for this: what nobody stated passes into the other estimates as well.
 
     Args:
-        vessel: as in `assess`.
         raw: with commands as inputs.
-        options: as in `assess`.
         smoothed: as in `settled`.
     """
     if options.motion != CONTINUOUS:

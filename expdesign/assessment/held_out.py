@@ -222,10 +222,8 @@ def held_out(
     those on the data that the estimates are from.
 
     Args:
-        candidates: with estimates from them.
         ship: gives the limits of rudders, and the length.
         seen_as: what of a record is predicted.
-        integration: how models are simulated.
     """
     apart: list[Batch] = []
     models: list[list[Found | None]] = []

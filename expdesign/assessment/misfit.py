@@ -134,7 +134,6 @@ def decomposed(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool
         run: its simulation; where that diverged shares are nan.
         found: the estimate, for its covariance.
         wind: whether the model is simulated in the measured wind.
-        integration: how it is simulated.
     """
     places = [OUTPUTS.index(name) for name in model.outputs]
     measured = whole(run.batch.velocity[:, places])

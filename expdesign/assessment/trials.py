@@ -235,7 +235,6 @@ def attempted(
     What the data do not show is held at the vessel's values where a prior is to be joined, see `released`.
 
     Args:
-        vessel: whose values it starts from.
         start: of the first instruments.
         times: estimated too.
         begun: where output error goes on.

@@ -305,7 +305,6 @@ def joined(logs: Sequence[Log], apart: Collection[str] = ()) -> list[Log]:
     would have to fit, a clock of its own that began anew in the next file goes on after a gap.
 
     Args:
-        logs: as read.
         apart: names of files that go on from no other.
     """
     groups: list[list[Log]] = []

@@ -339,8 +339,6 @@ def advised(problem: PlanProblem, refused: NoPlan, progress: Progress = silent) 
 
     Args:
         problem: that was refused, with the water in which it was.
-        refused: by the planner.
-        progress: says what is tried.
     """
     progress(f"there is no plan: {refused.obstacle}", math.nan)
     check = CHECKS.get(refused.what)

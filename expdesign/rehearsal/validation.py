@@ -378,7 +378,6 @@ def estimates_alone(
         vessel: nominal ship, simulated and estimated in the form of its model: continuous motion, or Euler's map.
         parameters: names to estimate; the others are held.
         total_s: informative time of the whole design [s].
-        trials: of each primitive.
         environment: weather, drawn anew for each trial as far as it is uncertain.
 
     Raises:

@@ -51,8 +51,6 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
     """The checked settings.
 
     Args:
-        vessel: gives the names of parameters.
-        primitives: names in the dictionary.
         entry: the table's place, for messages.
 
     Raises:

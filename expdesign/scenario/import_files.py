@@ -66,7 +66,6 @@ def equipped_vessel(path: Path, data: Sequence[Path]) -> tuple[Vessel, tuple[str
     """The vessel of a file, with what imports tell of sensors and actuators where the file is silent, and notes.
 
     Args:
-        path: of the vessel file.
         data: files, or folders of them; those without the file of an import beside them tell nothing.
 
     Raises:

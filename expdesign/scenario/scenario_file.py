@@ -194,7 +194,6 @@ def build_scenario(
     """A scenario from the tables of its file; raises as `load_scenario` does.
 
     Args:
-        content: the tables, unchecked.
         entry: the file, to which the files it names are relative.
         vessel: a vessel file in place of the one it names.
         data: measured since, as of `load_scenario`.
@@ -294,7 +293,6 @@ def berth_problem(berth: Berth, vessel: Vessel, area: SeaArea, settings: PlanSet
     """What is wrong with a start or goal, or "" when the hull keeps its clearance there.
 
     Args:
-        vessel: gives the hull rectangle.
         settings: with the least distance of the hull from anything forbidden.
         end: (3,) pose at the other end of the trial.
         way: to it or from it, e.g. "a way to the goal".

@@ -108,11 +108,6 @@ def read_toml(path: Path) -> dict[str, Any]:
 def check_table(model: type[T], data: object, entry: Entry) -> T:
     """One table as its model.
 
-    Args:
-        model: the table's model.
-        data: content of the file.
-        entry: its place.
-
     Raises:
         FileError: the first mistake; mistyped keys come before missing ones.
     """

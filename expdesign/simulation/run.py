@@ -34,7 +34,6 @@ def rolled(
     Accelerations are those just after the inputs of a sample, of the last one's at the end. A pendulum begins upright.
 
     Args:
-        vessel: whose roll is asked for.
         states: (k + 1, 6 or 8) at the samples.
         commands: k samples.
         sea: (k or 1, 4) n-frame current and wind.

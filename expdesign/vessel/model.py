@@ -236,7 +236,6 @@ class VesselModel:
         """The model with another prior covariance of its parameters; those not named count as known.
 
         Args:
-            names: of parameters.
             covariance: (n, n) of these.
         """
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))

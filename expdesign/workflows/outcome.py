@@ -126,10 +126,7 @@ def finished(
     Args:
         request: what was asked; the document states the command that repeats it.
         usual: folder where none is asked for.
-        files: their contents by name.
-        document: what they hold.
         page: name of the document as a page, where it has one.
-        drawing: progress of its figures.
     """
     document = document if document.command else replace(document, command=repeating(request))
     if page:

@@ -113,7 +113,6 @@ def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
     Stretches count where a model simulates some output of whole units worse than a constant.
 
     Args:
-        held: errors of the models.
         first: the first whose simulation decides so; the model before any cause may be as bad as it is.
     """
     stretches = [item.ahead for item in held if item.ahead is not None]

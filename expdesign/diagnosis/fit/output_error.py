@@ -41,7 +41,6 @@ def fit_ahead(found: Fit, windows: Windows, short: Windows, *, beside_stated: bo
     Standard errors are no smaller than those of the fit, and than the scatter from stretch to stretch tells.
 
     Args:
-        short: the same data in short windows.
         beside_stated: beside the parameters of the vessel file, as these stand in it.
 
     Raises:

@@ -73,8 +73,6 @@ def fitted_ahead(found: Selection, windows: Windows, short: Windows, *, beside_s
     """The same causes fitted as they are judged in short windows; None if that fails.
 
     Args:
-        windows: of its fits.
-        short: the same data in short windows.
         beside_stated: beside the parameters of the vessel file, instead of those within their standard deviations.
     """
     steps, before = list[Step](), None

@@ -123,13 +123,7 @@ class Row:
 def found_model(
     model: VesselModel, ship: ExtendedModel, std: Mapping[str, float]
 ) -> tuple[VesselModel, tuple[str, ...]]:
-    """The model with the effects of `ship`, and notes on it, one sentence each.
-
-    Args:
-        model: of the vessel file.
-        ship: with effects found.
-        std: standard errors of effects.
-    """
+    """The model with the effects of `ship`, and notes on it, one sentence each."""
     rows = [*_own(model, ship, std), *_added(ship, std)]
     rows = [_scaled(row, ship, std) for row in rows]
     if ship.get("asymmetry"):
@@ -286,8 +280,6 @@ def extend(
     """The vessel with the effects of `ship`, and notes on those that it cannot hold, one sentence each.
 
     Args:
-        ship: with effects found.
-        std: standard errors of effects.
         estimated: effects, and the covariance (c, c) of their estimates.
     """
     model, missing = found_model(vessel.model, ship, std)

@@ -102,7 +102,6 @@ def hold_times(vessel: Vessel, motions: Array, inputs: Array, settings: Mapping[
     """(n,) times [s] that levels are held, long enough for a share `sure` of the prior's vessels.
 
     Args:
-        vessel: nominal, with its prior.
         motions: (n, 3) nominal steady u, v, r.
         inputs: (n, m) commands of the levels.
         settings: those of `HOLD_SETTINGS`.

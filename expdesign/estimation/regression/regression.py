@@ -223,7 +223,6 @@ def drive_of(model: VesselModel, batch: Batch, *, substeps: int, times: Sequence
     """(k, c) inputs held over each sample, c = m, or those of its s parts and their shares of it, c = s m + s.
 
     Args:
-        model: gives the order of inputs.
         batch: recorded, or with delivered inputs.
         substeps: integrator steps per sample; a single one takes the mean over it.
         times: names of uncertain times of the actuators; derivatives by each follow in c columns [1/s].

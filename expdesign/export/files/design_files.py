@@ -43,7 +43,6 @@ def dictionary_json(
     """The dictionary with the information of each primitive, as dictionary.json.
 
     Args:
-        information: of each primitive.
         parameters: (p) names in the order of the matrices.
         vessel: its model says which velocities have equations, its hull gives the footprint.
         mean_subtraction: by which primitives are ranked beside all others.
@@ -279,7 +278,6 @@ def subsets_json(
     """Draws of every design with their simulation errors; null where there is no estimate or its model diverges.
 
     Args:
-        drawn: of each design.
         outputs: velocities that have equations.
         pieces, labels: of each piece.
         command: that gives the same.

@@ -128,7 +128,6 @@ def plan_json(
 
     Args:
         plan: verified.
-        vessel: for name and particulars.
         environment: the forecast it was planned for.
         clearance_m: the required clearance [m].
         accuracy: that is expected of the trial, where it is known.

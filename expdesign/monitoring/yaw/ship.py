@@ -54,7 +54,6 @@ def yaw_changes(ship: YawShip, *, size: float = RELATIVE_SIZE) -> tuple[Change, 
     """Every parameter, and the moment of the drives.
 
     Args:
-        ship: as it was learnt.
         size: relative change that matters.
     """
     changes = [

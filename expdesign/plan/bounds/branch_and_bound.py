@@ -167,7 +167,6 @@ def time_saved_s(
         repeats: how often; runs with much to gain come first.
         water: where amidships may be, and whatever else is half the beam from the hull's sides.
         ends: start and goal, (2,) or (3,).
-        vessel: whose hull needs room.
         known_s: bound on the path less all savings that is known already.
     """
     tracks = {run.name: track_of(run, vessel, headway.current_to) for run in runs}

@@ -96,7 +96,6 @@ def leg_end(
     faster than their rates from those at the end. Actuators that answer late may still show others: then any count.
 
     Args:
-        vessel, environment: who, in what air.
         speed_mps, inputs: at the end; nan where a command may be anything.
         top_mps: speed of the fastest leg.
         yaw_rate_radps: no turn is faster.

@@ -291,7 +291,6 @@ def feature_polygons(
 
     Args:
         geometry: in GeoJSON.
-        entry: names the feature.
         near_lon_deg: longitudes are counted within half a turn of it; of the first polygon where None.
         repairs: grows.
     """

@@ -96,9 +96,7 @@ def step_list(
     """Steps between levels (k, m) of all inputs, one after the other; levels that repeat the one before are left out.
 
     Args:
-        names: input signals.
         levels: of the commands.
-        controls: throttle and rudder among them.
         numbers: of the steps that lead to each level, None for levels that are only gone to; counted where not given.
         first_s: time planned for the first hold [s]; infinite where none is.
 

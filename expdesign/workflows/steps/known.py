@@ -34,7 +34,6 @@ def updated(
     that can simulate the data. Notes say so.
 
     Args:
-        vessel: as known before.
         record: the data, draught over depth among its inputs where the model reads depth.
         fixed: parameters that are not to be estimated.
         prior_counts: whether to combine the estimate with the vessel's values by their standard deviations.

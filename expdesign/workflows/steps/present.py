@@ -138,7 +138,6 @@ def present_motion(seen: Record, record: Record, ship: Vessel, path: Path) -> Un
         seen: the data, velocities reduced to the reference point.
         record: the same, with commands as inputs.
         ship: whose actuators deliver them.
-        path: of the last file.
 
     Raises:
         FileError: the last seconds hold no velocity.

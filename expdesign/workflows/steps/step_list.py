@@ -32,8 +32,6 @@ def listed_steps(path: Path, names: Sequence[str], controls: Controls, vessel: V
     Args:
         path: plan.json, whose runs hold the steps; a dictionary with families of steps (.toml); or a CSV of commands,
             one row for each hold, or with times.
-        names: input signals.
-        controls: throttle and rudder among them.
         vessel: for which a dictionary is built; None where none is known.
 
     Raises:

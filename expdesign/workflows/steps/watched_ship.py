@@ -63,7 +63,6 @@ def ship_and_changes(
 
     Args:
         name: "vessel" or one of `YAW`.
-        vessel: of the vessel file.
         record: a piece of the data.
         known: changes of earlier pieces; none for the first, which a yaw model is learnt from.
         size: relative change that matters.
