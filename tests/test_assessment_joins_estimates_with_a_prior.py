@@ -11,6 +11,7 @@ from expdesign.assessment import EstimateOptions
 from expdesign.assessment.prior import held_for, released, with_prior
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.values import into_range
+from expdesign.export.estimate_page import out_of_range
 from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
@@ -150,6 +151,18 @@ def test_a_range_falls_away_where_the_estimate_alone_contradicts_it() -> None:
     assert far.contradicted_ranges == ()
     assert far.parameter_range == {"X_abs_u_u": (-np.inf, 0.0)}
     assert (far.drawn_parameters(100, np.random.default_rng(0))[:, 1] <= 0.0).all()
+
+
+@pytest.mark.parametrize(("low", "told"), [(0.2, ""), (0.35, ""), (0.7, "X_u")])
+def test_an_estimate_of_which_hardly_any_ship_is_in_range_says_so(low: float, told: str) -> None:
+    """Its vessel file cannot be planned with; that was said no sooner than by the plan."""
+    model = replace(known([0.1, 0.1]), parameter_range={"X_u": (low, np.inf), "X_abs_u_u": (-np.inf, 0.0)})
+    sentences = out_of_range(model)
+    assert len(sentences) == bool(told)
+    if told:
+        assert f"by {told}. " in sentences[0]
+        with pytest.raises(InputError, match=r"model\.parameter_min"):
+            model.drawn_parameters(100, np.random.default_rng(0))
 
 
 def test_euler_s_parameters_have_no_such_prior() -> None:

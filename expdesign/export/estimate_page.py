@@ -29,7 +29,7 @@ from expdesign.export.files import (
     rows_by_equation,
     unstable_warning,
 )
-from expdesign.vessel import NOT_ACTING_BACK, Vessel, VesselModel, column_name
+from expdesign.vessel import LEAST_KEPT, NOT_ACTING_BACK, Vessel, VesselModel, column_name
 
 FAST_DECAY = 1e-3  # growth of an initial error below which the table says that it decays
 DRAWN_METHODS = 3  # largest number of methods in the figures of runs
@@ -75,7 +75,7 @@ def advice(found: Assessment) -> list[str]:
     """Advice on the choice of the estimate, from the residuals of these data."""
     best = found.best
     lag = best.one_step.autocorrelation[1]
-    sentences = [*([found.why] if found.why else []), *unstable_warning(found)]
+    sentences = [*([found.why] if found.why else []), *unstable_warning(found), *out_of_range(best.model)]
     if (lag < -0.25).any():
         sentences.append(
             f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated. This indicates "
@@ -95,6 +95,20 @@ def advice(found: Assessment) -> list[str]:
             "and a model with fewer terms."
         )
     return sentences
+
+
+def out_of_range(model: VesselModel) -> list[str]:
+    """A sentence where hardly any ship that an estimate allows has the signs that the vessel file states."""
+    if not model.parameter_range or model.share_in_range() >= LEAST_KEPT:
+        return []
+    values, ranges = dict(zip(model.names, model.parameters.tolist(), strict=True)), model.parameter_range
+    beyond = [name for name, (low, high) in ranges.items() if not low <= values[name] <= high]
+    where = f", most of all by {', '.join(beyond)}" if beyond else ""
+    return [
+        "Hardly any ship that these errors allow is within the ranges of parameters that the vessel file states"
+        f"{where}. No plan can be tried with ships of vessel-estimated.toml: --prior parameter_std joins what the "
+        "file knew before, and more runs tell more."
+    ]
 
 
 def current_sentence(flow: Current) -> str:
