@@ -259,6 +259,24 @@ except KeyboardInterrupt:
     assert not living(tmp_path)
 
 
+def hears_ctrl_c(_number):
+    time.sleep(0.2)
+    return signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_no_process_that_works_for_another_hears_ctrl_c():
+    """From its start on: an interruption while it imports a solver aborts it, with pages of traces."""
+    code = """
+from expdesign.processes import in_order, local_processes
+from test_processes_share_work import hears_ctrl_c
+with local_processes(3):
+    print(set(in_order(hears_ctrl_c, (), [(number,) for number in range(9)])))
+"""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    told = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert told.stdout == "{False}\n"
+
+
 def test_what_killed_processes_leave_is_removed_without_a_word():
     """Semaphores of a program that ends in the middle of them, which the system keeps until they are removed."""
     code = """

@@ -28,6 +28,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import islice
+from multiprocessing import resource_tracker
 from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
@@ -102,12 +103,13 @@ class Processes:
         return partial(self._begun, both)
 
     def _begun(self, both: bytes, task: bytes) -> Any:
+        if self._executor is None:
+            _track_quietly()
         with _without_interruptions():
             if self._executor is not None:
                 # what a process died of is told to who waits for it; other work goes on with others
                 with suppress(BrokenProcessPool):
                     return self._executor.submit(outcome_of, both, task)
-            _track_quietly()
             self._executor = ProcessPoolExecutor(max_workers=self.count, timeout=IDLE_S, initializer=_may_grow)
             return self._executor.submit(outcome_of, both, task)
 
@@ -144,11 +146,15 @@ def _may_grow() -> None:
 
 
 def _track_quietly() -> None:
-    """Start the process that removes semaphores which killed processes leave; it does so without warning of it."""
+    """Start the processes that remove semaphores which killed processes leave; they do so without warning of it.
+
+    Before any other: to start them lets Ctrl-C through to what this thread starts afterwards, whatever it blocks.
+    """
     before = os.environ.get("PYTHONWARNINGS")
     os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (before, "ignore:resource_tracker")))
     try:
         ensure_running()
+        resource_tracker.ensure_running()
     finally:
         if before is None:
             del os.environ["PYTHONWARNINGS"]
