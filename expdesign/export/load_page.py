@@ -77,7 +77,7 @@ def step_table(content: LoadContent) -> Table:
         (
             f"{len(step.options)}, chosen" if step is plan.chosen else str(len(step.options)),
             "; ".join(plan.question.options[place].name for place in step.options),
-            f"{step.efficiency:.3f}", f"{step.smallest:.1e}",
+            f"{step.efficiency:.3f}", f"{step.smallest:.2g}",
         )
         for step in plan.steps
     ]  # fmt: skip

@@ -94,7 +94,7 @@ def scaled_rows(content: RollContent) -> list[tuple[str, ...]]:
 def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
     """What would determine the open directions, the best first."""
     count = len(content.report.free)
-    return [(one.what, str(count - one.rank), f"{one.smallest:.1e}") for one in content.report.cures]
+    return [(one.what, str(count - one.rank), f"{one.smallest:.2g}") for one in content.report.cures]
 
 
 def roll_sentences(content: RollContent) -> Iterator[str]:
