@@ -13,9 +13,10 @@ from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.monte_carlo import guidance as guiding
-from expdesign.plan.monte_carlo.guidance import GO_AROUND_ROOM, Approach, Guidance
-from expdesign.plan.monte_carlo.procedure import goal_within_m, slowing, tolerances
-from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers
+from expdesign.plan.monte_carlo import procedure
+from expdesign.plan.monte_carlo.guidance import Guidance
+from expdesign.plan.monte_carlo.procedure import Approach, goal_within_m, slowing, steady_states, tolerances
+from expdesign.plan.monte_carlo.return_paths import GO_AROUND_ROOM, GoAroundPaths, PathFollowers
 from expdesign.plan.runs import Fleet, Truths
 from expdesign.simulation import CALM
 from expdesign.vessel import Vessel
@@ -140,6 +141,68 @@ def test_go_arounds_keep_off_the_shore_where_there_is_room(room, turns_north):
     assert path[:, 0].min() >= shore + water.leg_margin_m + GO_AROUND_ROOM * radius - 1.0
 
 
+@pytest.mark.thorough
+def test_ships_that_do_not_settle_on_a_run_up_take_a_longer_one(monkeypatch):
+    """Another attempt of the same length ends as the last one did, mirrored where she turns to the other side."""
+    vessel = coaster()
+    water = replace(open_water(vessel), start_tolerance=3.0)
+    helm, rng = Helmsman(vessel=vessel, environment=CALM, ship=water.ship), np.random.default_rng(7)
+    start = np.r_[0.0, 0.0, 0.0, water.ship.approach.velocity]
+    leg = np.vstack([steady_states(helm, start, np.arange(-100, 0)), start])
+    drawn = vessel.model.parameters * (1.0 + 0.4 * rng.uniform(-1, 1, (60, len(vessel.model.parameters))))
+    slow = drawn[[2, 6, 15, 21, 24, 46]]  # of these 60 ships half of those that do not settle
+    count = len(slow)
+    truths = Truths(parameters=slow, current_to=np.zeros((count, 2)), wind_to=np.zeros((count, 2)))
+    beside = leg[0] + np.array([0.0, 2.0 * vessel.length_m, 0.5, 0.0, 0.0, 0.0])  # too far to return to the leg
+
+    def begun() -> int:
+        fleet = Fleet(
+            vessel, CALM, truths, state=beside, standing=water.ship.approach.inputs, rng=np.random.default_rng(5)
+        )
+        guidance = Guidance(
+            helm,
+            water,
+            leg,
+            within=tolerances(water),
+            sailing=np.ones(count, bool),
+            inputs=water.ship.approach.inputs,
+            last=False,
+            longest=10_000,
+        )
+        return int(guidance.sail(fleet, np.zeros((count, 3))).begun.sum())
+
+    longer = begun()
+    monkeypatch.setattr(procedure, "LONGER_RUN_UPS", ())
+    assert longer == count
+    assert begun() == 0
+
+
+def test_where_no_way_leads_to_the_beginning_of_a_run_up_a_shorter_one_is_taken():
+    """The beginning of the usual one is near the shore: a ship would have to come out of it."""
+    vessel, water = coaster(), open_water(coaster())
+    radius, length = water.ship.turning_radius_m, vessel.length_m
+    helm = Helmsman(vessel=vessel, environment=CALM, ship=water.ship)
+    leg = np.tile([0.0, 0.0, 0.0, *water.ship.approach.velocity], (60, 1))
+    leg[:, 0] = np.linspace(-2.0 * length, 0.0, 60)
+    usual_m = water.ship.run_up_s(vessel, water.ship.transit_speed_mps) * water.ship.transit_speed_mps
+    sea = area(shapely.box(-10 * radius, -usual_m - water.leg_margin_m - length, 10 * radius, 20 * radius))
+    near = replace(water, area=sea, field=clearance_field(sea, resolution_m=length / 4))
+    guidance = Guidance(
+        helm,
+        near,
+        leg,
+        within=tolerances(near),
+        sailing=np.ones(1, bool),
+        inputs=water.ship.approach.inputs,
+        last=False,
+    )
+    path = guidance._round(0, np.array([length, length, 0.0]))
+    assert path is not None
+    begins_m = -path[-1, 0]
+    assert 0.2 * usual_m < begins_m < 0.9 * usual_m
+    assert guidance._arcs(guidance._usual)[-1].find(np.array([length, length, 0.0])) is None
+
+
 def stopped(vessel: Vessel, offset: tuple[float, float], *, spare_m: float, heading_rad: float = 0.0) -> Approach:
     """24 drawn ships on a leg to a standing start, some hull lengths north and east of where it begins."""
     water, count = open_water(vessel), 24
@@ -248,7 +311,7 @@ def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_t
     narrow = replace(water, area=channel, field=clearance_field(channel, resolution_m=length / 4))
     parameters = vessel.model.parameters[None]
     truths = Truths(parameters=parameters, current_to=np.zeros((1, 2)), wind_to=np.zeros((1, 2)))
-    state = leg[0] + np.array([0.0, 0.4 * leg[-1, 1], 0.0, 0.0, 0.0, 0.0])
+    state = leg[0] + np.array([0.0, 0.8 * leg[-1, 1], 0.0, 0.0, 0.0, 0.0])  # past the shortest run-up
     fleet = Fleet(vessel, CALM, truths, state=state, standing=ship.approach.inputs, rng=np.random.default_rng(5))
     guidance = Guidance(
         helm,
@@ -259,7 +322,7 @@ def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_t
         inputs=ship.approach.inputs,
         last=False,
     )
-    assert guidance._round(state[:3]) is None
+    assert guidance._round(0, state[:3]) is None
     found = guidance.sail(fleet, np.zeros((1, 3)))
     assert found.begun.all()
     assert not found.go_arounds.any()

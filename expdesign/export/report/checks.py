@@ -32,7 +32,9 @@ def procedure_sentences(plan: Plan) -> list[str]:
         f"Start gate: begin the next run if {within}. At a start from rest, stop on the planned heading. A ship that "
         "thrusters hold there waits until she is well within; any other begins as soon as she is within.",
         "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
-        f"on the planned heading at the planned speed. After {words.counted(risk.go_arounds, 'go-around')}, abort the "
+        "on the planned heading at the planned speed. If a steered ship had not settled on it, make the next approach "
+        "twice as long, and the one after it three times, where there is room. "
+        f"After {words.counted(risk.go_arounds, 'go-around')}, abort the "
         f"trial; also where one start takes longer to reach than the whole planned trial, {words.duration(planned_s)}.",
         f"Goal: it is reached within {words.distance(risk.legs[-1].position_m)} of it, at any heading and speed.",
     ]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
-import shapely
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.procedure import (
     ABORT_CAUSES,
+    Approach,
     Tolerances,
     at_rest,
     goal_within_m,
@@ -23,13 +22,12 @@ from expdesign.plan.monte_carlo.return_paths import (
     GoAroundPaths,
     PathFollowers,
     ReturnPaths,
+    build_go_arounds,
     build_return_paths,
-    covers_path,
 )
 from expdesign.plan.runs import Fleet
 from expdesign.values import Array
 
-GO_AROUND_ROOM = 1.0  # turning radii that paths of arcs keep from the water's edge where they can
 GO_AROUNDS = 4  # for one run at most; then the trial is aborted
 PAST_START_HULLS = 1.0  # hull lengths past the start over which a reference continues steadily
 # a ship may take so many times as long as planned for a reference or a path, and so many time constants of the return
@@ -52,18 +50,6 @@ SIDEWAYS_SHARE = 0.5  # of an azimuth's thrust ahead or astern, below which it c
 STRAIGHT = 2  # points of a path without bends
 TRACKING, RETURNING, BEGUN, ABORTED, OUT = range(5)
 """What a ship does: tracks a reference, follows a return path, has begun the run, has aborted, takes no part."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Approach:
-    """How n ships reached the start of a run."""
-
-    poses: Array  # (t, n, 3) at every sample; ships that have begun or aborted stay where they are
-    begun: np.ndarray  # (n,) within tolerance; the others that sailed aborted
-    go_arounds: np.ndarray  # (n,) of each ship
-    samples: np.ndarray  # (n,) that it took
-    abort_cause: np.ndarray  # (n,) index in `ABORT_CAUSES`, for ships that aborted
-    unexplained: Array  # (n, 3) estimate at the end of the acceleration that the nominal model does not explain
 
 
 class Guidance:
@@ -100,11 +86,16 @@ class Guidance:
         self._desired, self._moves, self._within = track[-1], not at_rest(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
+        self._run_ups = {share: self._first + row for share, row in runs_up.begins.items()}
+        self._usual = next(row for share, row in self._run_ups.items() if share <= 1.0)
+        self._begins = np.full(n, self._usual)
         steps_m = lengths(np.diff(self._reference.states[:, :2], axis=0))
         self._way_m = np.r_[0.0, np.cumsum(steps_m)]
-        length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
+        begin = self._reference.states[self._usual]
+        length_m = float(np.hypot(*(begin - track[-1])[:2]))
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
-        self._followers = PathFollowers(helm, runs_up.states[0], n, reach_m=float(reach_m))
+        self._arcs_to: dict[int, tuple[GoAroundPaths, ...]] = {}
+        self._followers = PathFollowers(helm, begin, n, reach_m=float(reach_m))
         self.doing = np.where(sailing, TRACKING, OUT)
         self._shift: Array = np.zeros((n, 2))
         leg_s = planned.arrival * helm.vessel.sample_time_s
@@ -226,9 +217,9 @@ class Guidance:
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships], self._shift[ships] = TRACKING, 0.0
-        self._at[ships], self._end[ships] = self._first, self._arrival
+        self._at[ships], self._end[ships] = self._begins[ships], self._arrival
         self._most[ships] = len(self._reference.states) - 1
-        self._deadline[ships] = self._sample + self._allowed(self._arrival - self._first)
+        self._deadline[ships] = self._sample + self._allowed(self._arrival - self._begins[ships])
 
     def _parallel(self, states: Array) -> Array:
         """(n, 2) by how much the leg is moved towards ships (n, 6) that would not return to it within its time.
@@ -314,7 +305,10 @@ class Guidance:
         if not len(ships):
             return
         sideways = self._helm.ship.keeps_station
-        paths = self._tree.find(states[:, :2]) if sideways else [self._round(pose) for pose in states[:, :3]]
+        if sideways:
+            paths = self._tree.find(states[:, :2])
+        else:
+            paths = [self._round(ship, pose) for ship, pose in zip(ships.tolist(), states[:, :3], strict=True)]
         for ship, path in zip(ships.tolist(), paths, strict=True):
             if path is None:
                 self._abort_cause[ship] = ABORT_CAUSES.index("no go-around path")
@@ -324,28 +318,30 @@ class Guidance:
                 self._followers.start(ship, path)
         self._await(ships[self.doing[ships] == RETURNING])
 
-    def _round(self, pose: Array) -> Array | None:
-        """A path of arcs (k, 2) from a pose (3,) to the run-up, off the shore where there is room; None for none."""
-        return next((path for arcs in self._arcs if (path := arcs.find(pose)) is not None), None)
+    def _round(self, ship: int, pose: Array) -> Array | None:
+        """A path of arcs (k, 2) from a ship's pose (3,) to a run-up, off the shore where there is room; None for none.
 
-    @cached_property
-    def _arcs(self) -> tuple[GoAroundPaths, ...]:
-        """Paths that leave room for ships that turn wider than planned, where the run-up has it, and all paths."""
-        helm, goal, graph = self._helm, self._followers.goal[:3], self._water.narrowest_graph
-        radius_m = helm.ship.turning_radius_m
-        roomy = shapely.buffer(graph.water, -GO_AROUND_ROOM * radius_m)
-        shapely.prepare(roomy)
-        waters = [graph.water, roomy] if shapely.contains_xy(roomy, goal[1], goal[0]) else [graph.water]
-        return tuple(
-            GoAroundPaths(
-                goal=goal, radius_m=radius_m, spacing_m=helm.vessel.length_m, holds=partial(covers_path, water)
-            )
-            for water in reversed(waters)
-        )
+        To a longer run-up than the last one, on which she did not settle, or else to the longest that has a way to it.
+        """
+        for share, begin in self._run_ups.items():
+            for arcs in self._arcs(begin) if share <= 1.0 + self.go_arounds[ship] else ():
+                path = arcs.find(pose)
+                if path is not None:
+                    self._begins[ship], self._followers.goals[ship] = begin, self._reference.states[begin]
+                    return path
+        return None
+
+    def _arcs(self, begin: int) -> tuple[GoAroundPaths, ...]:
+        """Paths to the run-up that begins in this row of the reference."""
+        if begin not in self._arcs_to:
+            ship, length_m = self._helm.ship, self._helm.vessel.length_m
+            goal, water = self._reference.states[begin, :3], self._water.narrowest_graph.water
+            self._arcs_to[begin] = build_go_arounds(water, goal, radius_m=ship.turning_radius_m, spacing_m=length_m)
+        return self._arcs_to[begin]
 
     @cached_property
     def _tree(self) -> ReturnPaths:
-        return build_return_paths(self._water.narrowest_graph, self._followers.goal[:2])
+        return build_return_paths(self._water.narrowest_graph, self._reference.states[self._usual, :2])
 
     def _near(self, ships: np.ndarray, given: Array) -> Array:
         """(k, m) commands to whose angles azimuths keep: those of the run for ships on their last stretch to it."""
@@ -366,7 +362,7 @@ class Guidance:
         slowest = float(vessel.rates[vessel.turns_freely].min(initial=np.inf))
         half_turn = np.pi / slowest / vessel.sample_time_s
         sideways = np.abs(np.cos(self._inputs)) < SIDEWAYS_SHARE
-        return half_turn + np.where(sideways, 0.0, self._arrival - self._first)
+        return half_turn + np.where(sideways, 0.0, self._arrival - self._usual)
 
     def _next(self, ships: np.ndarray, states: Array) -> Array:
         """(k, 6) desired states of ships (k,) over the next sample; references advance."""

@@ -11,13 +11,14 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
    ship cannot: it stops straight ahead, and begins as soon as it is within them.
 4. Otherwise it goes around, as it does where it cannot return to a leg: by the shortest path in safe water to the
    beginning of a run-up, then up to the start again, steady on the planned heading and speed; `GO_AROUNDS` times at
-   most. Then the trial is aborted, as it is where this takes longer than the whole planned trial.
+   most. Then the trial is aborted, as it is where this takes longer than the whole planned trial. A ship
+   that sails arcs takes a longer run-up each time, up to the longest of `LONGER_RUN_UPS`, where there is room.
 5. The goal is reached by a ship that comes within `GOAL_HULLS` of it; heading and speed do not count there.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import radians
 
 import numpy as np
@@ -39,7 +40,14 @@ SPEED_SHARE, YAW_RATE_SHARE = 0.1, 0.1  # tolerances of its velocity in transit 
 # share of the position's tolerance by which another speed at the start may move the run instead, and its limit in
 # transit speeds
 SPEED_MOVES, SPEED_MOST_SHARE = 0.5, 0.3
-RUN_UP_SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)  # of a run-up that are tried, where a whole one has no room
+RUN_UP_SHARES = (
+    1.0,
+    0.75,
+    0.5,
+    0.35,
+    0.25,
+)  # of a run-up that are tried, where a whole one has no room or no way to it
+LONGER_RUN_UPS = (2.0, 3.0)  # in run-ups, of ships that sail arcs and did not settle on the last one
 # speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill
 REST_SHARE = 0.05
 
@@ -115,12 +123,26 @@ def speed_decay_s(vessel: Vessel, speed_mps: float) -> float:
     return 1.0 / damping if damping > 0 else np.inf
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Approach:
+    """How n ships reached the start of a run."""
+
+    poses: Array  # (t, n, 3) at every sample; ships that have begun or aborted stay where they are
+    begun: np.ndarray  # (n,) within tolerance; the others that sailed aborted
+    go_arounds: np.ndarray  # (n,) of each ship
+    samples: np.ndarray  # (n,) that it took
+    abort_cause: np.ndarray  # (n,) index in `ABORT_CAUSES`, for ships that aborted
+    unexplained: Array  # (n, 3) estimate at the end of the acceleration that the nominal model does not explain
+
+
 @sealed(states="k 6")
 class Stretch:
     """A reference that leads to the start of a run, and a little past it."""
 
     states: Array  # (k + 1, 6) sample by sample
     arrival: int  # row of the planned start
+    # row in which a run-up of a share begins, the longest first
+    begins: dict[float, int] = field(default_factory=lambda: {1.0: 0})
 
 
 def planned_stretch(helm: Helmsman, track: Array, after_m: float) -> Stretch:
@@ -134,22 +156,29 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
     """The run-up to the end of a planned leg (k + 1, 6), continued so far past it [m].
 
     Steady as the run begins; where no such stretch keeps its clearance, the last part of the planned leg itself. A run
-    that begins at rest needs none if the ship keeps station: it stops on the spot.
+    that begins at rest needs none if the ship keeps station: it stops on the spot. Ships that sail
+    arcs may begin on a longer one, too.
     """
     desired, sample_s = leg[-1], helm.vessel.sample_time_s
     moves = not at_rest(helm, desired)
     if not moves and helm.ship.keeps_station:
         return Stretch(states=np.stack([desired, desired]), arrival=1)
     samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*desired[3:5]))) / sample_s
-    for share in RUN_UP_SHARES:
-        count = max(2, round(share * samples))
-        before = steady_states(helm, desired, np.arange(-count, 0)) if moves else slowing(helm, desired, count)
-        if water.holds(np.concatenate([before, desired[None]])[:, :3]):
-            break
-    else:
+    arcs = moves and not helm.ship.keeps_station
+    counts = {share: max(2, round(share * samples)) for share in (*RUN_UP_SHARES, *(LONGER_RUN_UPS if arcs else ()))}
+    longest = max(counts.values())
+    before = steady_states(helm, desired, np.arange(-longest, 0)) if moves else slowing(helm, desired, longest)
+    held = {s: n for s, n in counts.items() if water.holds(np.vstack([before[longest - n :], desired])[:, :3])}
+    if not held:
         before = leg[max(0, len(leg) - 1 - round(samples)) : -1]
+        held = {1.0: len(before)}
+    before = before[len(before) - max(held.values()) :]
     more = steady_states(helm, desired, np.arange(1, _after(helm, desired, after_m) + 1))
-    return Stretch(states=np.concatenate([before, desired[None], more]), arrival=len(before))
+    return Stretch(
+        states=np.concatenate([before, desired[None], more]),
+        arrival=len(before),
+        begins={share: len(before) - count for share, count in sorted(held.items(), reverse=True)},
+    )
 
 
 def at_rest(helm: Helmsman, states: Array) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -29,6 +29,7 @@ BRAKING = 0.5  # share of the mean acceleration that is used for slowing down on
 SIDEWAYS_SPEED = 0.5  # sideways and astern, in transit speeds
 LOOK_AHEAD_HULLS = 1.5  # of helm-steered ships on return paths (line of sight guidance)
 BEND_HULLS = 0.4  # distance from a bend at which a ship has reached it
+GO_AROUND_ROOM = 1.0  # turning radii that paths of arcs keep from the water's edge where they can
 # distances from the goal of the poses through which go-arounds lead, in turning radii
 NODES_RADII = (2.0, 4.0, 7.0, 11.0)
 NODE_BEARINGS, NODE_COURSES = 12, 8  # bearings of these poses at each distance, and courses at each of them
@@ -78,16 +79,16 @@ def build_return_paths(graph: VisibilityGraph, place: Array) -> ReturnPaths:
 
 
 class PathFollowers:
-    """n ships, each on a path of its own to one state.
+    """n ships, each on a path of its own to a state.
 
     Attributes:
-        goal: (6,) where all paths lead.
+        goals: (n, 6) where the paths lead.
         length_m: (n,) of the paths at their start.
     """
 
     def __init__(self, helm: Helmsman, goal: Array, ships: int, *, reach_m: float) -> None:
-        """No ship has a path yet; a ship within `reach_m` of the goal has arrived."""
-        self._helm, self.goal = helm, goal
+        """No ship has a path yet; all are to lead to a goal (6,), and a ship within `reach_m` of it has arrived."""
+        self._helm, self.goals = helm, np.tile(goal, (ships, 1))
         self._path: Array = np.tile(goal[:2], (ships, 2, 1))
         self._left: Array = np.zeros((ships, 2))
         self._bend: Array = np.full((ships, 2), helm.ship.transit_speed_mps)
@@ -106,7 +107,7 @@ class PathFollowers:
             self._curvature = np.pad(self._curvature, ((0, 0), (0, room)))
         count, fastest = len(path), self._helm.ship.transit_speed_mps
         steps = np.diff(path, axis=0)
-        self._path[ship], self._left[ship], self._next[ship] = self.goal[:2], 0.0, min(1, count - 1)
+        self._path[ship], self._left[ship], self._next[ship] = self.goals[ship, :2], 0.0, min(1, count - 1)
         self._path[ship, :count] = path
         length = np.hypot(*steps.T)
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
@@ -122,21 +123,22 @@ class PathFollowers:
 
     def arrived(self, ships: np.ndarray, states: Array) -> np.ndarray:
         """(k,) which of some ships (k,) have arrived and, if they keep station, are on the desired heading."""
-        helm, off = self._helm, states[:, :2] - self.goal[:2]
+        helm, goals = self._helm, self.goals[ships]
+        off = states[:, :2] - goals[:, :2]
         there = lengths(off) < self._reach_m
         if helm.ship.keeps_station:
-            turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
+            turned = np.abs(wrap_angle(states[:, 2] - goals[:, 2])) < TURNED_RAD
             return np.asarray(there & turned & (np.abs(states[:, 5]) < TURNED_RAD / (2.0 * helm.answer_s)))
-        ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
+        ahead = off[:, 0] * np.cos(goals[:, 2]) + off[:, 1] * np.sin(goals[:, 2])
         on_last = self._left[ships, self._next[ships]] <= 0.0
-        return np.asarray(there | (on_last & (off @ ahead > 0.0)))
+        return np.asarray(there | (on_last & (ahead > 0.0)))
 
     def desired(self, ships: np.ndarray, states: Array) -> Array:
         """(k, 6) desired states of some ships (k,): towards their paths, at a speed from which they slow in time."""
         helm, keeps = self._helm, self._helm.ship.keeps_station
         length, fastest = helm.vessel.length_m, helm.ship.transit_speed_mps
         self._pass_bends(ships, states[:, :2])
-        at = self._next[ships]
+        at, course_there = self._next[ships], self.goals[ships, 2]
         there, before = self._path[ships, at], self._path[ships, at - 1]
         offset = there - states[:, :2]
         ahead = lengths(offset)
@@ -144,7 +146,7 @@ class PathFollowers:
         near = (left < TURN_HULLS * length) & keeps
         speed = self._speed(ahead, self._bend[ships, at])
         if near.any():
-            lengthways = np.cos(np.arctan2(offset[near, 1], offset[near, 0]) - self.goal[2])
+            lengthways = np.cos(np.arctan2(offset[near, 1], offset[near, 0]) - course_there[near])
             slow = np.minimum(
                 fastest * np.maximum(lengthways, SIDEWAYS_SPEED),
                 left[near] / (TRACK_LEAD * helm.answer_s),
@@ -159,7 +161,7 @@ class PathFollowers:
             pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
         course = pursued / np.maximum(lengths(pursued), 1e-9)[:, None]
         through = course * speed[:, None] - helm.environment.current_to
-        heading = np.where(near, self.goal[2], np.arctan2(through[:, 1], through[:, 0]))
+        heading = np.where(near, course_there, np.arctan2(through[:, 1], through[:, 0]))
         if keeps:
             off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
             speed = speed * np.where(near, 1.0, np.maximum(off, BEND_SPEED))
@@ -244,6 +246,19 @@ class GoAroundPaths:
             )
             for ring, bearing, course in product(NODES_RADII, bearings, courses)
         ]
+
+
+def build_go_arounds(
+    water: shapely.Geometry, goal: Array, *, radius_m: float, spacing_m: float
+) -> tuple[GoAroundPaths, ...]:
+    """Paths to a pose (3,) that leave room for ships that turn wider than planned, where it has that, and all paths."""
+    roomy = shapely.buffer(water, -GO_AROUND_ROOM * radius_m)
+    shapely.prepare(roomy)
+    waters = [roomy, water] if shapely.contains_xy(roomy, goal[1], goal[0]) else [water]
+    return tuple(
+        GoAroundPaths(goal=goal, radius_m=radius_m, spacing_m=spacing_m, holds=partial(covers_path, room))
+        for room in waters
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
