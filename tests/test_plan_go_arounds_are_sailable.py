@@ -300,7 +300,8 @@ def test_a_leg_that_leads_past_the_goal_reaches_it_at_its_end(hulls):
     assert guidance._arrived.any() == (hulls * length <= goal_within_m(water))
 
 
-def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_the_same():
+def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_the_same(monkeypatch):
+    monkeypatch.setattr(procedure, "RUN_UP_SHARES", (1.0,))  # shorter ones begin ahead of her
     vessel = coaster()
     water, length = open_water(vessel), vessel.length_m
     ship, radius = water.ship, water.ship.turning_radius_m
@@ -311,7 +312,7 @@ def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_t
     narrow = replace(water, area=channel, field=clearance_field(channel, resolution_m=length / 4))
     parameters = vessel.model.parameters[None]
     truths = Truths(parameters=parameters, current_to=np.zeros((1, 2)), wind_to=np.zeros((1, 2)))
-    state = leg[0] + np.array([0.0, 0.8 * leg[-1, 1], 0.0, 0.0, 0.0, 0.0])  # past the shortest run-up
+    state = leg[0] + np.array([0.0, 0.4 * leg[-1, 1], 0.0, 0.0, 0.0, 0.0])
     fleet = Fleet(vessel, CALM, truths, state=state, standing=ship.approach.inputs, rng=np.random.default_rng(5))
     guidance = Guidance(
         helm,
