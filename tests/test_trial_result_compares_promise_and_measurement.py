@@ -13,7 +13,7 @@ from expdesign.export import words
 from expdesign.export.files import plan_json, planned_accuracy
 from expdesign.export.result_page import CHANCE, Estimated, PlanResult, ResultContent, result_document, run_rows
 from expdesign.shortest_day import AccuracySettings
-from expdesign.vessel import Sensors
+from expdesign.vessel import Actuator, Limit, Response, Sensors, Term
 
 
 def plan_text(asked: AccuracySettings | None = None) -> str:
@@ -168,3 +168,29 @@ def test_files_that_are_not_of_this_trial_are_refused(
     assert main([*call, "--out", str(tmp_path / "out")]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_thruster_that_stands_still_leaves_its_own_parameter_without_an_accuracy_and_no_other():
+    vessel = replace(case.tug(), sensors=Sensors(velocity_mps=0.01, yaw_rate_radps=0.001))
+    of_tug = planned_accuracy(case.plan(), case.design().problem, vessel=vessel, environment=case.ENVIRONMENT)
+    model = vessel.model
+    tunnel = Actuator(kind="tunnel", number=1, limits=(Limit(low=-5, high=5),), responses=(Response(rate=1),))
+    more = replace(
+        model,
+        terms=(*model.terms, Term(equation="v", name="Y_n1", expression="abs(n1)*n1")),
+        parameters=np.append(model.parameters, 0.01),
+        parameter_std=np.append(model.parameter_std, 0.002),
+        actuators=(*model.actuators, tunnel),
+    )
+    commands = case.plan().commands
+    values = np.column_stack([commands.values, np.zeros(len(commands))])
+    standing = replace(commands, names=more.inputs, values=values)
+    found = planned_accuracy(
+        replace(case.plan(), commands=standing),
+        replace(case.design().problem, parameters=more.names),
+        vessel=replace(vessel, model=more),
+        environment=case.ENVIRONMENT,
+    )
+    assert np.isnan([found.runs[-1], found.track[-1]]).all()
+    assert found.runs[:-1] == pytest.approx(of_tug.runs)
+    assert found.track[:-1] == pytest.approx(of_tug.track)

@@ -15,7 +15,7 @@ import numpy as np
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.durations import DurationProblem
-from expdesign.errors import NoAnswer
+from expdesign.errors import NoAnswer, NotInformative
 from expdesign.export.files.text import csv_text, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
 from expdesign.information.expected import TrialPart, expected_covariance
@@ -47,22 +47,30 @@ def planned_accuracy(
     environment: Environment,
     asked: AccuracySettings | None = None,
 ) -> PlannedAccuracy:
-    """Standard deviations expected of instrumental variables, to first order in the vessel file's sensor noise."""
+    """Standard deviations expected of instrumental variables, to first order in the vessel file's sensor noise.
+
+    Parameters of which nothing is told, such as those of a thruster that stands still, do not keep others from theirs.
+    """
     model, sailed, names = vessel.model, plan.sailed, problem.parameters
 
-    def deviations(parts: Sequence[TrialPart]) -> Array:
+    def deviations(parts: Sequence[TrialPart], blind: tuple[str, ...] = ()) -> Array:
+        told = np.array([name not in blind for name in names])
+        found = np.full(len(names), np.nan)
         try:
             covariance = expected_covariance(
                 vessel,
                 parts,
-                names,
+                tuple(np.array(names)[told].tolist()),
                 environment=environment,
                 mean_subtraction=problem.mean_subtraction,
                 unknown_current=environment.current_std_mps > 0,
             )
+        except NotInformative as refused:
+            return found if blind or told.sum() == len(refused.parameters) else deviations(parts, refused.parameters)
         except NoAnswer:
-            return np.full(len(names), np.nan)
-        return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+            return found
+        found[told] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return found
 
     place = [model.names.index(name) for name in names]
     nominal = model.parameters[place]

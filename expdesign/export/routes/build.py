@@ -40,6 +40,7 @@ from expdesign.sea_area import as_multipolygon
 from expdesign.values import Array
 
 CORRIDOR = 1.0  # cross-track distance where the water has room for it, in ship lengths
+MARGIN = 0.5  # of it beyond the planned track where the water has room, in ship lengths
 NAMED_LETTERS = 24  # of a manoeuvre's name in the name of a waypoint
 
 
@@ -82,7 +83,8 @@ def build_bridge_route(
 
     Neighbouring waypoints are at least `WAYPOINT_SPACING` ship lengths apart, unless the corridor would leave
     the water. The track stays within the cross-track distances of each leg, to port and to starboard. Where the water
-    has room for it, they are `CORRIDOR` ship lengths at least.
+    has room for it, they are `CORRIDOR` ship lengths at least, and `MARGIN` more than the planned track needs, so that
+    a ship that sails it nearly does not raise an alarm.
 
     Args:
         safe_water: where the hull may be, in (east, north), or None when the chart is not at hand; then the track's
@@ -111,8 +113,8 @@ def build_bridge_route(
     for (one, two), (start, end) in zip(pairwise(stops), pairwise(ends), strict=True):
         needed = sides_needed(points[one[0] : two[1] + 1], start, end)
         least = (_rounded_up(needed[0] + fit.curved_m), _rounded_up(needed[1] + fit.curved_m))
-        wanted_m = _rounded_up(CORRIDOR * track.length_m)
-        wide = widened(start, end, least, wanted_m=wanted_m, water=water, half_beam_m=half_beam_m)
+        wanted = [_rounded_up(max(CORRIDOR, side / track.length_m + MARGIN) * track.length_m) for side in needed]
+        wide = widened(start, end, least, wanted=(wanted[0], wanted[1]), water=water, half_beam_m=half_beam_m)
         sides.append((_rounded_down(wide[0]), _rounded_down(wide[1])))
     names, held = _names(track, stops), [_held(track, stop) for stop in stops]
     route = _route(track, stops, places, [sides[0], *sides], fit=fit, fence=fence, departure=departure)

@@ -185,14 +185,14 @@ def widened(
     end: Array,
     needed: Sides,
     *,
-    wanted_m: float,
+    wanted: Sides,
     water: shapely.Geometry | None,
     half_beam_m: float,
 ) -> Sides:
     """The needed sides, each widened to what is wanted or to what the water allows."""
     sides = list(needed)
     for index in (0, 1):
-        low, high = sides[index], wanted_m
+        low, high = sides[index], wanted[index]
         if low >= high:
             continue
         for _ in range(CORRIDOR_HALVINGS):

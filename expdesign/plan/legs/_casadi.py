@@ -40,6 +40,8 @@ CORNERED = 4  # iterations that IPOPT spends about a good answer before it is ta
 PROGRAMS = 24  # nonlinear programs kept built
 
 
+IDLE_SHARE = 1e-9  # of a scale, below which a command of an answer is none: interior points end beside nothing
+
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 RELAXED = 1e-8
 """IPOPT may exceed bounds by this (its `bound_relax_factor`); rates of actuators keep as much away from theirs."""
@@ -263,7 +265,8 @@ class Program:
             return None
         values = np.asarray(answer["x"]).ravel()
         states = values[: 6 * (j + 1)].reshape(j + 1, 6) * self.state_scale + origin
-        inputs = values[6 * (j + 1) : (6 + m) * (j + 1)].reshape(j + 1, m) * self.input_scale
+        inputs = values[6 * (j + 1) : (6 + m) * (j + 1)].reshape(j + 1, m)
+        inputs = np.where(np.abs(inputs) < IDLE_SHARE, 0.0, inputs) * self.input_scale
         return replace(problem, states=states, inputs=inputs), float(values[-1])
 
 
