@@ -28,6 +28,7 @@ BEND_SPEED = 0.25  # least speed at bends and while the bow points elsewhere, in
 BRAKING = 0.5  # share of the mean acceleration that is used for slowing down on return paths
 SIDEWAYS_SPEED = 0.5  # sideways and astern, in transit speeds
 LOOK_AHEAD_HULLS = 1.5  # of helm-steered ships on return paths (line of sight guidance)
+ARC_HULLS = 1.5  # distance from the next bend of an arc within which a ship turns as the arc does
 BEND_HULLS = 0.4  # distance from a bend at which a ship has reached it
 GO_AROUND_ROOM = 1.0  # turning radii that paths of arcs keep from the water's edge where they can
 # distances from the goal of the poses through which go-arounds lead, in turning radii
@@ -167,8 +168,9 @@ class PathFollowers:
             speed = speed * np.where(near, 1.0, np.maximum(off, BEND_SPEED))
         north, east = (course * speed[:, None]).T
         c, s = np.cos(heading), np.sin(heading)
-        # arcs are steered from their bends on
-        rate = np.zeros(len(ships)) if keeps else self._curvature[ships, at] * speed
+        # arcs are steered from their bends on, by ships that are near: farther off they would circle beside the bend
+        turning = (ahead < ARC_HULLS * length) & (not keeps)
+        rate = turning * self._curvature[ships, at] * speed
         rows = [states[:, 0], states[:, 1], heading, north * c + east * s, east * c - north * s, rate]
         return np.array(rows).T
 
