@@ -141,28 +141,31 @@ def test_go_arounds_keep_off_the_shore_where_there_is_room(room, turns_north):
     assert path[:, 0].min() >= shore + water.leg_margin_m + GO_AROUND_ROOM * radius - 1.0
 
 
-def test_a_ship_beside_her_arc_goes_back_to_it_instead_of_circling_beside_its_next_bend():
-    """With the arc's yaw rate wherever she is, she turned round beside the bend until the current had her ashore."""
-    vessel, water = coaster(), open_water(coaster())
-    ship, length = water.ship, vessel.length_m
+def test_ships_beside_their_arc_go_back_to_it_instead_of_circling_beside_its_next_bend():
+    """With the arc's yaw rate wherever she is, a ship turned round beside the bend until the current had her ashore."""
+    vessel, water, count = coaster(), open_water(coaster()), 48
+    ship, length, rng = water.ship, vessel.length_m, np.random.default_rng(3)
     helm = Helmsman(vessel=vessel, environment=CALM, ship=ship)
     start = np.array([0.0, 0.0, 0.0, *ship.approach.velocity])
-    radius = ship.turning_radius_m
-    path = dubins_curve(start[:3], np.array([0.0, 2.0 * radius, np.pi]), radius_m=radius, spacing_m=length)[:, :2]
-    current = np.array([[0.0, 0.1 * ship.transit_speed_mps]])
-    truths = Truths(parameters=vessel.model.parameters[None], current_to=current, wind_to=np.zeros((1, 2)))
-    away = start + np.array([-2.0 * length, 5.0 * length, np.pi / 2, 0.0, 0.0, 0.0])
-    standing, rng = ship.approach.inputs, np.random.default_rng(5)
-    fleet = Fleet(vessel, CALM, truths, state=away, standing=standing, rng=rng)
-    followers = PathFollowers(helm, np.r_[path[-1], np.pi, start[3:]], 1, reach_m=length)
-    followers.start(0, path)
-    unexplained, arrived = np.zeros((1, 3)), False
+    back = np.array([0.0, 2.0 * ship.turning_radius_m, np.pi])
+    path = dubins_curve(start[:3], back, radius_m=ship.turning_radius_m, spacing_m=length)[:, :2]
+    off = np.column_stack([rng.uniform(-5.0, 5.0, (count, 2)) * length, rng.uniform(-1.5, 1.5, count)])
+    angle = rng.uniform(0.0, 2.0 * np.pi, count)
+    current = 0.1 * ship.transit_speed_mps * np.column_stack([np.cos(angle), np.sin(angle)])
+    parameters = np.tile(vessel.model.parameters, (count, 1))
+    truths = Truths(parameters=parameters, current_to=current, wind_to=np.zeros((count, 2)))
+    fleet = Fleet(vessel, CALM, truths, state=start, standing=ship.approach.inputs, rng=rng)
+    fleet.states = fleet.states + np.column_stack([off, np.zeros((count, 3))])
+    followers, ships = PathFollowers(helm, np.r_[back, start[3:]], count, reach_m=length), np.arange(count)
+    for number in range(count):
+        followers.start(number, path)
+    unexplained, arrived = np.zeros((count, 3)), np.zeros(count, dtype=bool)
     for _ in range(round(3.0 * (polyline_length(path) + 10.0 * length) / ship.transit_speed_mps)):
-        before, only = fleet.states, np.array([0])
-        fleet.advance(helm.commands(followers.desired(only, before), before, fleet.given, unexplained=unexplained))
+        before = fleet.states
+        fleet.advance(helm.commands(followers.desired(ships, before), before, fleet.given, unexplained=unexplained))
         unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
-        arrived |= bool(followers.arrived(only, fleet.states)[0])
-    assert arrived
+        arrived |= followers.arrived(ships, fleet.states)
+    assert arrived.all()
 
 
 @pytest.mark.thorough
