@@ -7,16 +7,13 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import (
     Accuracy,
     accuracy,
     check_excitation,
     constant_inputs,
     one_step_residuals,
-    white_noise_std,
 )
 from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
@@ -53,13 +50,14 @@ from expdesign.diagnosis.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.judgement import (
-    LITTLE_FIT,
     errors_as_judged,
+    explains_little,
     found_by_predictions,
     gains_on_other_runs,
     harmless_beside_the_file,
     harms,
     losses_without,
+    more_than_noise,
     with_alternatives,
     without_harm,
     worth_writing,
@@ -95,8 +93,6 @@ from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-MORE_THAN_NOISE = 2.0
-"""The simulation explains little of an output below `LITTLE_FIT`, if its error is so many times the noise."""
 VALIDATED, COMPARED, CONCLUDED = 4.0, 80.0, 25.0
 """Work of the cross-validation of a model, of the comparison of causes by predictions, and of conclusions, in
 simulations of all data."""
@@ -205,24 +201,12 @@ def select_causes(
     )
 
 
-def explains_little(after: Accuracy, windows: Windows) -> bool:
-    """Whether a simulation explains little of some output whose error is much more than noise."""
-    return bool(((after.fit < LITTLE_FIT) & more_than_noise(after, windows)).any())
-
-
-def more_than_noise(after: Accuracy, windows: Windows) -> NDArray[np.bool_]:
-    """(n,) whether the error of an output is much more than its noise."""
-    columns = [OUTPUTS.index(name) for name in after.outputs]
-    return np.asarray(after.rmse > MORE_THAN_NOISE * white_noise_std(windows.measured[..., columns]))
-
-
+# gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict
 LEAST_GAIN_WITHIN_STD = 1.0
-"""Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
-MOST_SAMPLES = 400_000
-"""Eleven hours at 10 Hz. 36,000 of 1 s take about 840 MiB of memory, the program's own included."""
+MOST_SAMPLES = 400_000  # eleven hours at 10 Hz; 36,000 of 1 s take about 840 MiB of memory, the program's own included
+# compared samples up to which other processes save no time, because they are started and fits are sent to them: of an
+# hour at 1 Hz, a fifth of the work can be shared, and takes twice as long elsewhere
 FEW_SAMPLES = 10_000
-"""Compared samples up to which other processes save no time, because they are started and fits are sent to them: of an
-hour at 1 Hz, a fifth of the work can be shared, and takes twice as long elsewhere."""
 SIMULATED = 18.0  # work before the selection, in simulations of all data
 
 

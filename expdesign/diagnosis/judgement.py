@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.accuracy import WHOLE_S, pooled_fit
+from expdesign.diagnosis.accuracy import WHOLE_S, Accuracy, pooled_fit, white_noise_std
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import (
     AHEAD_S,
@@ -43,6 +44,7 @@ from expdesign.signals import Record
 from expdesign.values import Array
 
 LITTLE_FIT = 50.0  # fit of an output [%] below which a simulation explains little
+MORE_THAN_NOISE = 2.0  # of the noise, that its error is then
 
 
 def errors_as_judged(
@@ -355,3 +357,14 @@ def _simulated(ship: ExtendedModel, windows: Windows) -> tuple[Array, bool]:
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
     motion = simulate_from_measured(ship, windows)
     return pooled_fit(motion.error[..., columns], windows.measured[..., columns]), motion.diverged
+
+
+def explains_little(after: Accuracy, windows: Windows) -> bool:
+    """Whether a simulation explains little of some output whose error is much more than noise."""
+    return bool(((after.fit < LITTLE_FIT) & more_than_noise(after, windows)).any())
+
+
+def more_than_noise(after: Accuracy, windows: Windows) -> NDArray[np.bool_]:
+    """(n,) whether the error of an output is much more than its noise."""
+    columns = [OUTPUTS.index(name) for name in after.outputs]
+    return np.asarray(after.rmse > MORE_THAN_NOISE * white_noise_std(windows.measured[..., columns]))

@@ -34,12 +34,10 @@ from expdesign.kinematics.instruments import (
     Finding,
     course_as_heading,
     gyro_against_heading,
-    integral,
     log_against_positions,
     shown_delays,
-    stretches,
 )
-from expdesign.kinematics.relation import CERTAIN, relation
+from expdesign.kinematics.relation import CERTAIN, integral, relation, stretches
 from expdesign.reduction import at_reference_point, readings_by_sensor, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array

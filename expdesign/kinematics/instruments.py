@@ -19,15 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.conventions import plus_minus
-from expdesign.kinematics.relation import CERTAIN, SCALE_STD, Relation, relation
+from expdesign.kinematics.relation import CERTAIN, SCALE_STD, Relation, integral, relation, samples_in_window, stretches
 from expdesign.signals import Batch
 from expdesign.values import Array
 
-LENGTHS = 1.0  # ship lengths sailed in a window
-WINDOW_SAMPLES = 5  # fewest samples of a window
-LONGEST_WINDOW_S = 60.0  # of a window [s]
-WINDOWS = 1.5  # least length of a stretch, in windows
-BLOCKS = 20  # stretches that the record is cut into, each left out in turn for the standard errors
 SCALE_MATTERS = 0.02  # change of a scale that is told
 SWAY_WITHIN = 1.5  # factor within which the scale of sway is that of surge; beyond, sway is hardly more than noise
 TURN_MATTERS_RAD = 0.0175  # misalignment that is told [rad]
@@ -223,7 +218,7 @@ def _true_share(running: Sequence[Array], batches: Sequence[Batch], *, length_m:
     noise = [
         (np.nanmean(np.diff(batch.velocity[:, 1], 2) ** 2) / 6.0 * batch.sample_time_s**2 * window, len(batch))
         for batch in batches
-        if len(batch) > (window := _window(batch, length_m))
+        if len(batch) > (window := samples_in_window(batch, length_m))
     ]
     white = np.average([size for size, _ in noise], weights=[count for _, count in noise])
     return float(1.0 - white / max(np.mean(np.abs(rest) ** 2), 1e-300))
@@ -416,40 +411,6 @@ def _drifting(batch: Batch) -> Array:
     way = np.cumsum(np.append(0.0, middle * np.diff(batch.pose[:, 0] + 1j * batch.pose[:, 1])))
     stream = np.cumsum(np.append(0.0, middle)) * batch.sample_time_s
     return np.column_stack([way.imag, heading, way.real, stream.real, stream.imag])
-
-
-def stretches(batches: Sequence[Batch], running: Sequence[Array], *, length_m: float) -> list[Array]:
-    """Changes (k, n) of running values over windows, in stretches of which one after the other is left out."""
-    windows = [_window(batch, length_m) for batch in batches]
-    changes = [_changes(values, window) for values, window in zip(running, windows, strict=True)]
-    alone = sum(len(part) / window for part, window in zip(changes, windows, strict=True)) / WINDOWS
-    count = min(BLOCKS, int(alone))
-    size = max(1.0, sum(map(len, changes)) / max(count, 1))
-    return (
-        [piece for part in changes if len(part) for piece in np.array_split(part, max(1, round(len(part) / size)))]
-        if count
-        else []
-    )
-
-
-def _changes(values: Array, window: int) -> Array:
-    """Changes over every window of so many samples, where both ends are measured."""
-    steps = values[window:] - values[:-window]
-    return np.asarray(steps[np.isfinite(steps).all(axis=1)], dtype=complex)
-
-
-def _window(batch: Batch, length_m: float) -> int:
-    """Samples in which the ship sails about her length."""
-    speeds = np.hypot(*batch.velocity[:, :2].T)
-    speed = float(np.nanmedian(speeds)) if np.isfinite(speeds).any() else 0.0
-    seconds = min(LONGEST_WINDOW_S, LENGTHS * length_m / max(speed, 1e-9))
-    return max(WINDOW_SAMPLES, round(seconds / batch.sample_time_s))
-
-
-def integral(values: Array, batch: Batch) -> Array:
-    """(k,) running integral over time, by the trapezoidal rule."""
-    means = (values[1:] + values[:-1]) / 2.0
-    return np.cumsum(np.append(0.0, means)) * batch.sample_time_s
 
 
 def _rms(values: Array) -> float:

@@ -18,8 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.signals import Batch
 from expdesign.values import Array
 
+LENGTHS = 1.0  # ship lengths sailed in a window
+WINDOW_SAMPLES = 5  # fewest samples of a window
+LONGEST_WINDOW_S = 60.0  # of a window [s]
+WINDOWS = 1.5  # least length of a stretch, in windows
+BLOCKS = 20  # stretches that the record is cut into, each left out in turn for the standard errors
 FEWEST_BLOCKS = 8  # with which a comparison is made
 CERTAIN = 6.0  # standard errors from what would be right at which a finding is told
 # standard error of a scale, at least: readings of several samples, rounding and filters in instruments change scales by
@@ -110,3 +116,37 @@ def _solved(moments: Array, told: float) -> tuple[Array, Array, float] | None:
     values = np.zeros(len(scale) - 1, dtype=complex)
     values[used[1:]] = np.concatenate([[a], nuisance @ (m[2:, 0] - a * m[2:, 1])]) * scale[0] / scale[used][1:]
     return values, partial * np.outer(scale[:2], scale[:2]), own
+
+
+def stretches(batches: Sequence[Batch], running: Sequence[Array], *, length_m: float) -> list[Array]:
+    """Changes (k, n) of running values over windows, in stretches of which one after the other is left out."""
+    windows = [samples_in_window(batch, length_m) for batch in batches]
+    changes = [_changes(values, window) for values, window in zip(running, windows, strict=True)]
+    alone = sum(len(part) / window for part, window in zip(changes, windows, strict=True)) / WINDOWS
+    count = min(BLOCKS, int(alone))
+    size = max(1.0, sum(map(len, changes)) / max(count, 1))
+    return (
+        [piece for part in changes if len(part) for piece in np.array_split(part, max(1, round(len(part) / size)))]
+        if count
+        else []
+    )
+
+
+def _changes(values: Array, window: int) -> Array:
+    """Changes over every window of so many samples, where both ends are measured."""
+    steps = values[window:] - values[:-window]
+    return np.asarray(steps[np.isfinite(steps).all(axis=1)], dtype=complex)
+
+
+def samples_in_window(batch: Batch, length_m: float) -> int:
+    """Samples in which the ship sails about her length."""
+    speeds = np.hypot(*batch.velocity[:, :2].T)
+    speed = float(np.nanmedian(speeds)) if np.isfinite(speeds).any() else 0.0
+    seconds = min(LONGEST_WINDOW_S, LENGTHS * length_m / max(speed, 1e-9))
+    return max(WINDOW_SAMPLES, round(seconds / batch.sample_time_s))
+
+
+def integral(values: Array, batch: Batch) -> Array:
+    """(k,) running integral over time, by the trapezoidal rule."""
+    means = (values[1:] + values[:-1]) / 2.0
+    return np.cumsum(np.append(0.0, means)) * batch.sample_time_s
