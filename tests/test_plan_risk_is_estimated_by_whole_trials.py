@@ -78,6 +78,9 @@ def test_every_trial_has_one_outcome_and_runs_begin_within_tolerance():
     assert trials.go_arounds.max() <= GO_AROUNDS
     over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
     assert not trials.samples[1:][over].any()  # nothing is sailed after the end
+    ways = np.array([leg.kind == "reposition" for leg in planned().legs])
+    assert (trials.samples.max(axis=1)[ways] <= np.array(trials.longest)[ways] + 1.0).all()
+    assert not np.array(trials.longest)[~ways].any()
 
 
 def test_parts_sailed_in_turn_have_streams_of_their_own_and_no_more_ships_than_one_part(monkeypatch):
@@ -257,6 +260,7 @@ def outcomes(left: np.ndarray, aborted: np.ndarray) -> Trials:
         abort_cause=blank,
         place=np.where(left[..., None], np.full(2, 10.0), np.nan),
         within=(tolerances(leg_water(OPEN)),) * len(left),
+        longest=(100.0,) * len(left),
     )
 
 

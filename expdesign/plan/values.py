@@ -199,6 +199,7 @@ class LegOutcome:
     # median_s, most_s: median and 95th percentile of the time it took [s]
     median_s: float
     most_s: float
+    longest_s: float  # time on it after which a trial is aborted; zero of runs [s]
     # position_m, speed_mps: distance from the planned start, and difference from the planned velocity over ground,
     # within which a run begins
     position_m: float

@@ -21,7 +21,9 @@ def procedure_sentences(plan: Plan) -> list[str]:
     risk = plan.risk
     if risk is None:
         return []
-    planned_s = len(plan.commands) * plan.commands.sample_time_s
+    longest_s = [leg.longest_s for leg in risk.legs if leg.longest_s]
+    longest = " to ".join(dict.fromkeys(words.duration(value) for value in (min(longest_s), max(longest_s))))
+    later = ", by the length of the leg" if " to " in longest else ""
     within = _tolerances(risk, [leg.kind == "primitive" for leg in plan.legs])
     return [
         "Run: give the orders on the card without correcting for the motion of the ship.",
@@ -34,8 +36,8 @@ def procedure_sentences(plan: Plan) -> list[str]:
         "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
         "on the planned heading at the planned speed. If a steered ship had not settled on it, make the next approach "
         "twice as long, and the one after it three times, where there is room. "
-        f"After {words.counted(risk.go_arounds, 'go-around')}, abort the "
-        f"trial; also where one start takes longer to reach than the whole planned trial, {words.duration(planned_s)}.",
+        f"After {words.counted(risk.go_arounds, 'go-around')}, abort the trial; also where a start is not reached "
+        f"within {longest} of the end of the run before{later}.",
         f"Goal: it is reached within {words.distance(risk.legs[-1].position_m)} of it, at any heading and speed.",
     ]
 

@@ -100,15 +100,17 @@ UNITS = {
     "rad": ("\N{DEGREE SIGN}", 180.0 / np.pi),
     "s": ("s", 1.0),
     "m": ("m", 1.0),
-    "fraction": ("of the run", 1.0),
+    "fraction": ("% of the run", 100.0),
 }
 """Ending of a setting's name -> unit shown and factor to it."""
 
 
 def settings_sentence(item: PrimitiveInformation) -> str:
-    """Settings of a primitive in friendly units, without its duration and offsets of zero."""
+    """Settings of a primitive in friendly units, without its duration, and offsets and shares of zero."""
     told = {name: value for name, value in item.primitive.settings.items() if name != "duration_s"}
-    chosen = {name: value for name, value in told.items() if abs(value) > NEARLY_ZERO or "offset" not in name}
+    chosen = {
+        k: value for k, value in told.items() if abs(value) > NEARLY_ZERO or not ("offset" in k or "fraction" in k)
+    }
     return ", ".join(setting(name, value) for name, value in chosen.items())
 
 

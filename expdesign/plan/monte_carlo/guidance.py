@@ -104,7 +104,7 @@ class Guidance:
         self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
         self._deadline = np.full(n, self._allowed(len(track)))
-        self._longest = max(longest, LONGEST_ATTEMPTS * self._allowed(len(track)))
+        self.longest = max(longest, LONGEST_ATTEMPTS * self._allowed(len(track)))
 
     def sail(self, fleet: Fleet, unexplained: Array) -> Approach:
         """Until every ship has begun or aborted, from the estimates of unexplained acceleration so far (n, 3)."""
@@ -163,7 +163,7 @@ class Guidance:
         if over.any():
             over &= self.doing[ships] == TRACKING
             self._go_around(ships[over], states[over])
-        if self._sample > self._longest:
+        if self._sample > self.longest:
             sails = ships[self.doing[ships] < BEGUN]
             self.doing[sails], self._abort_cause[sails] = ABORTED, ABORT_CAUSES.index("time")
 

@@ -11,8 +11,9 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
    ship cannot: it stops straight ahead, and begins as soon as it is within them.
 4. Otherwise it goes around, as it does where it cannot return to a leg: by the shortest path in safe water to the
    beginning of a run-up, then up to the start again, steady on the planned heading and speed; `GO_AROUNDS` times at
-   most. Then the trial is aborted, as it is where this takes longer than the whole planned trial. A ship
-   that sails arcs takes a longer run-up each time, up to the longest of `LONGER_RUN_UPS`, where there is room.
+   most. Then the trial is aborted, as it is where this takes longer than the whole planned trial, and than twice what
+   one attempt may take. A ship that sails arcs takes a longer run-up each time, up to the longest of `LONGER_RUN_UPS`,
+   where there is room.
 5. The goal is reached by a ship that comes within `GOAL_HULLS` of it; heading and speed do not count there.
 """
 

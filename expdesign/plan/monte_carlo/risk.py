@@ -147,7 +147,9 @@ class Trials:
     used: Array  # (legs, n) largest share of a tolerance used up where a run began; nan where none did
     abort_cause: np.ndarray  # (legs, n) index in `ABORT_CAUSES`, for aborted trials
     place: Array  # (legs, n, 2) where hulls left allowed water; nan where they did not
-    within: tuple[Tolerances, ...]  # start tolerances of each leg
+    # within, longest: start tolerances of each leg, and samples on it after which a trial is aborted; zero of runs
+    within: tuple[Tolerances, ...]
+    longest: tuple[float, ...]
 
     @property
     def completed(self) -> np.ndarray:
@@ -200,9 +202,9 @@ def sail_trials(
     for part in in_order(_sail_part, (water, sailed, within), zip(counts, streams, strict=True)):
         progress("sailing drawn trials", len(parts) / len(counts))
         parts.append(part)
-    outcomes = [name for name in vars(parts[0]) if name != "within"]
+    outcomes = [name for name in vars(parts[0]) if name not in ("within", "longest")]
     joined = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in outcomes}
-    return Trials(**joined, within=within)
+    return Trials(**joined, within=within, longest=parts[0].longest)
 
 
 def _sail_part(
@@ -224,7 +226,7 @@ def _sail_part(
     shape = (len(legs), draws)
     left, aborted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     go_arounds, abort_cause = np.zeros(shape, dtype=np.int8), np.zeros(shape, dtype=np.int8)
-    samples = np.zeros(shape, dtype=np.int32)
+    samples, longest = np.zeros(shape, dtype=np.int32), [0.0] * len(legs)
     used, place = np.full(shape, np.nan), np.full((*shape, 2), np.nan)
     for index, leg in enumerate(legs):
         progress("sailing drawn trials", leg.first / len(commands))
@@ -244,7 +246,7 @@ def _sail_part(
                 last=index == len(legs) - 1,
                 longest=len(commands),
             )
-            found = guidance.sail(fleet, unexplained)
+            found, longest[index] = guidance.sail(fleet, unexplained), float(guidance.longest)
             unexplained, poses, begun = found.unexplained, found.poses, found.begun
             go_arounds[index], samples[index], abort_cause[index] = found.go_arounds, found.samples, found.abort_cause
         place[index] = np.where(fleet.lost[:, None] & sailing[:, None], poses[-1, :, :2], collisions.exits(poses))
@@ -260,6 +262,7 @@ def _sail_part(
         abort_cause=abort_cause,
         place=place,
         within=within,
+        longest=tuple(longest),
     )
 
 
@@ -401,6 +404,7 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
         go_arounds=float(trials.go_arounds[index][sailed].mean()) if sailed.any() else 0.0,
         median_s=float(np.median(times)),
         most_s=float(np.quantile(times, UPPER_SHARE)),
+        longest_s=trials.longest[index] * sample_s,
     )
 
 
