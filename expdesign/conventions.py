@@ -62,8 +62,8 @@ def plus_minus(value: float, std: float) -> str:
     if abs(value) < 1e-4 or decimals > 9 or abs(value) >= 1e6:
         exponent = math.floor(math.log10(max(abs(value), std)))
         decimals = max(0, decimals + exponent)
-        return f"({value / 10**exponent:.{decimals}f} {apart} {std / 10**exponent:.{decimals}f})e{exponent}"
-    return f"{value:.{max(0, decimals)}f} {apart} {std:.{max(0, decimals)}f}"
+        return f"({value / 10**exponent:z.{decimals}f} {apart} {std / 10**exponent:.{decimals}f})e{exponent}"
+    return f"{value:z.{max(0, decimals)}f} {apart} {std:.{max(0, decimals)}f}"
 
 
 def listed(words: Sequence[str], last: str = "and") -> str:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from expdesign.conventions import plus_minus
 from expdesign.export import words
 from expdesign.export.files import Known
 from expdesign.export.report.design import known_sentences
@@ -124,3 +125,8 @@ def test_what_the_rest_of_a_trial_adds_is_smaller_or_larger_as_the_numbers_are(
 )
 def test_a_change_is_told_with_the_digits_of_its_error(value: float, std: float, words: str) -> None:
     assert Change(effect="gain", size=0.1, unit=(0.01, "%"), words="thrust").in_words(value, std) == words
+
+
+@pytest.mark.parametrize(("value", "std", "words"), [(-1e-5, 9.96e-3, "(0.0 ± 10.0)e-3"), (-0.01, 1.0, "0.0 ± 1.0")])
+def test_a_value_that_rounds_to_zero_has_no_minus_sign(value: float, std: float, words: str) -> None:
+    assert plus_minus(value, std) == words

@@ -123,7 +123,8 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
 SECONDS: dict[str, tuple[Callable[[Data], Data], str]] = {
     "sample time": (
         lambda data: data | {"time_s": 2 * data["time_s"]},
-        "time_s: has a sample every 1 s, expected every 0.5 s, as the first file (first.csv) has it",
+        "time_s: has a sample every 1 s, expected every 0.5 s, as the first file (first.csv) has it; "
+        "expdesign import --sample-time 0.5 resamples it",
     ),
     "inputs": (
         lambda data: {name: values for name, values in data.items() if name != "n1_rps"},
@@ -145,7 +146,11 @@ def test_files_must_fit_together(tmp_path: Path, kind: str) -> None:
 CLOCKS = [
     (1000.0, "has a sample every 500 s, expected at most 20 s (is it in milliseconds?)"),
     (1 / 60, "has a sample every 0.00833333 s, expected every 0.5 s, as the vessel has it (is it in minutes?)"),
-    (3.0, "has a sample every 1.5 s, expected every 0.5 s, as the vessel has it"),
+    (
+        3.0,
+        "has a sample every 1.5 s, expected every 0.5 s, as the vessel has it; expdesign import --sample-time 0.5 "
+        "resamples it",
+    ),
 ]
 
 

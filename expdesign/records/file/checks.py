@@ -114,7 +114,8 @@ def _check_sample_time(table: Table, found_s: float, wanted_s: float | None, who
             raise table.error("time_s", f"has a sample every {found_s:g} s, {most}")
     elif not same_sample_time(found_s, wanted_s):
         problem = f"has a sample every {found_s:g} s, expected every {wanted_s:g} s, as {whose} has it"
-        raise table.error("time_s", problem + _unit(found_s, wanted_s))
+        resampled = f"; expdesign import --sample-time {wanted_s:g} resamples it"
+        raise table.error("time_s", problem + (_unit(found_s, wanted_s) or resampled))
 
 
 def _unit(found_s: float, wanted_s: float | None) -> str:
