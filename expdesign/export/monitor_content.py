@@ -14,6 +14,7 @@ from expdesign.export.words import HOUR, counted, hours, percent, times, told_ap
 from expdesign.monitoring import (
     AS_LIKELY,
     EQUATIONS,
+    TOLD_APART,
     Alarm,
     Calibration,
     Call,
@@ -322,8 +323,9 @@ def alike(content: MonitorContent, number: int) -> list[str]:
 
 
 def delay_s(content: MonitorContent, number: int) -> float:
-    """Expected time to the alarm after a change of its size [s], in data like the reference."""
-    return float(soonest(content.calibration.rate[number], content.limit)) * content.calibration.stretch_s
+    """Expected time to the alarm after a change of its size [s], in data like the reference; a few stretches."""
+    stretches = max(float(soonest(content.calibration.rate[number], content.limit)), TOLD_APART[0])
+    return stretches * content.calibration.stretch_s
 
 
 def monitor_header(content: MonitorContent) -> tuple[str, ...]:

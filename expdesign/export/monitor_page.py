@@ -22,7 +22,7 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.words import HOUR, SINCE_1970_S, hours, when
-from expdesign.monitoring import KINDS, soonest
+from expdesign.monitoring import KINDS, TOLD_APART, soonest
 from expdesign.values import Array
 
 # What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
@@ -224,8 +224,9 @@ def monitor_document(content: MonitorContent) -> Document:
                 "What is watched for",
                 Table(header=monitor_header(content), rows=monitor_rows(content), texts=5),
                 "\u201cAlarm after\u201d is the expected time from a change of this size to its alarm, in operation "
-                "like that of the reference. Changes that are not distinguishable raise the same alarm; a manoeuvre of "
-                "another kind would distinguish them.",
+                f"like that of the reference, {hours(TOLD_APART[0] * content.calibration.stretch_s)} at least. The "
+                "alarm waits longer while weather beyond the reference may explain the data as well. Changes that are "
+                "not distinguishable raise the same alarm; a manoeuvre of another kind would distinguish them.",
                 *(WINDY,) * content.wind,
             ),
             section(

@@ -13,7 +13,7 @@ Sources: E. S. Page, Biometrika 41 (1954), 100-115; G. Lorden, Annals of Mathema
 M. Basseville and I. V. Nikiforov, Detection of Abrupt Changes (1993), chapters 2 and 8 for the local approach.
 """
 
-from expdesign.monitoring.alarms import AS_LIKELY, Again
+from expdesign.monitoring.alarms import AS_LIKELY, TOLD_APART, Again
 from expdesign.monitoring.calibration import Calibration, calibrate
 from expdesign.monitoring.changes import EQUATIONS, Change, watched_changes, watched_ship
 from expdesign.monitoring.cusum import calls_of, estimates, soonest, threshold, watch
