@@ -153,7 +153,6 @@ def test_what_is_held_fixed_stays_and_has_no_deviation(trial: Path, tmp_path: Pa
     assert {name: after.parameter_std[after.names.index(name)] for name in held} == {"X_u": 0, "N_mu": 0}
 
 
-@pytest.mark.thorough
 def test_generalised_forces_say_the_same_as_the_thrusters_they_come_from(tmp_path: Path) -> None:
     commands = tug_commands(600)
     path = write_run(tmp_path / "thrusters.csv", TUG_TRUE, commands, velocity=(1.7, 0.7, 0.0), **EULER)

@@ -191,7 +191,7 @@ def with_unstated(
 
     def again(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
         work = Work(vessel=ship, stated=ship, record=record, options=replace(options, horizon_s=own.horizon_s))
-        begun = Begun(values=held.values, horizon_s=own.horizon_s)
+        begun = Begun(values=dict(zip(held.names, held.values, strict=True)), horizon_s=own.horizon_s)
         free = attempted(work, ship, work.seen(record), method, times=times, begun=begun)
         return _informed(free, ship, options)  # as the one that it is compared with
 

@@ -101,7 +101,7 @@ def horizons_of(work: Work) -> tuple[float | None, ...]:
 
 def _begun(trial: Trial) -> Begun:
     """Where output error goes on from an estimate."""
-    return Begun(values=trial.found.values, horizon_s=trial.horizon_s)
+    return Begun(values=dict(zip(trial.found.names, trial.found.values, strict=True)), horizon_s=trial.horizon_s)
 
 
 def _with_help(work: Work, method: Method, error: InputError | NoAnswer) -> InputError | NoAnswer:
@@ -258,9 +258,7 @@ def attempted(
     )
 
     def asked(held: tuple[str, ...]) -> Estimate:
-        free = [name for name in vessel.model.names if name not in options.fixed]
-        going = begun and replace(begun, values=begun.values[[name not in held for name in free]])
-        own = replace(settings, fixed=(*options.fixed, *held), begun=going)
+        own = replace(settings, fixed=(*options.fixed, *held), begun=begun)
         return estimate(record, vessel.model, method=method.name, settings=own, progress=progress)
 
     try:

@@ -147,7 +147,10 @@ def minimise_output_error(
     )
     stages = _stages(record, fitting)
     if fitting.begun is not None:
-        values[: len(fitting.begun.values)] = fitting.begun.values
+        goes_on = [
+            fitting.begun.values.get(name, value) for name, value in zip(layout.parameters, values, strict=False)
+        ]
+        values[: len(goes_on)] = goes_on
     steps = Steps([(stage.work(record), stage.steps) for stage in stages], progress)
     found: dict[Place, Array] = {}
     answered, origin = 0, values

@@ -32,7 +32,7 @@ class ActuatorTime:
 class Begun:
     """Where a search goes on."""
 
-    values: Array  # (p,) parameters
+    values: Mapping[str, float]  # of parameters; others begin where the regression has them
     horizon_s: float | None  # with which they were found [s]; shorter ones are not searched again. None for whole runs.
 
 
