@@ -323,7 +323,10 @@ def alike(content: MonitorContent, number: int) -> list[str]:
 
 
 def delay_s(content: MonitorContent, number: int) -> float:
-    """Expected time to the alarm after a change of its size [s], in data like the reference; a few stretches."""
+    """Expected time to the alarm after a change of its size [s], in data like the reference.
+
+    It is no shorter than the fewest stretches by which a change of the ship is told from weather.
+    """
     stretches = max(float(soonest(content.calibration.rate[number], content.limit)), TOLD_APART[0])
     return stretches * content.calibration.stretch_s
 
