@@ -11,7 +11,7 @@ import pytest
 
 from binary_logs import write_parquet, write_ulog
 from expdesign.cli import main
-from expdesign.importing import Sampled, Stretch, cut_by_plan
+from expdesign.importing import Run, Sampled, Stretch, cut_by_plan, file_name
 from expdesign.signals import Commands
 from imported_runs import columns_of, run_import
 from logged_trial import Voyage, logger_rows, voyage, write_dialect
@@ -31,16 +31,28 @@ def test_the_runs_of_a_plan_are_found_by_its_commands() -> None:
     seen = np.concatenate([np.zeros(137), plan, np.zeros(80)]) + rng.normal(scale=0.02, size=817)
     stretch = Stretch(time_s=np.arange(817.0), columns={"rudder1_rad": seen, "u_mps": np.ones(817)})
     record = Sampled(stretches=(stretch,), sample_time_s=1.0, notes=(), held_s={}, channels={})
-    runs, words = cut_by_plan(record, commands, [("circle a", 0, 200), ("zig-zag b", 350, 600)])
-    assert [(run.name, run.stretch.time_s[0], len(run.stretch)) for run in runs] == [
-        ("circle a", 137.0, 200),
-        ("zig-zag b", 487.0, 250),
+    legs = [("circle a", 0, 200), ("zig-zag b", 350, 600), ("stop", 610, 660)]
+    runs, words = cut_by_plan(record, commands, legs[:2], length_m=10.0)
+    assert [(run.name, run.stretch.time_s[0], len(run.stretch), run.approach_s) for run in runs] == [
+        ("circle a", 107.0, 230, 30.0),  # with the approach of three ship lengths at 1 m/s
+        ("zig-zag b", 457.0, 280, 30.0),
     ]
+    (_, after), _ = cut_by_plan(record, commands, legs[1:], length_m=10.0)
+    assert (after.stretch.time_s[0], after.approach_s) == (737.0, 10.0)  # what another run has is no approach
     assert "begins 137.0 s" in words
     other = Commands(sample_time_s=1.0, names=("rudder1",), values=np.repeat(rng.uniform(-0.5, 0.5, 60), 10)[:, None])
-    runs, words = cut_by_plan(record, other, [("a", 0, 200)])
+    runs, words = cut_by_plan(record, other, [("a", 0, 200)], length_m=10.0)
     assert not runs
     assert "not found" in words
+
+
+def test_files_of_runs_to_port_and_to_starboard_are_not_named_alike() -> None:
+    stretch = Stretch(time_s=np.arange(3.0), columns={})
+    names = ("circle-helm--0.6", "circle-helm-0.6", "zig-zag b")
+    runs = [Run(name=name, family="as planned", stretch=stretch, approach_s=0.0) for name in names]
+    assert [file_name(1, run) for run in runs] == [
+        "01-circle-helm-minus-0-6.csv", "01-circle-helm-0-6.csv", "01-zig-zag-b.csv"
+    ]  # fmt: skip
 
 
 @pytest.mark.thorough

@@ -5,6 +5,7 @@ The truth is a 50 m ship with a rudder of 0.05 rad/s, simulated here by itself i
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -23,7 +24,8 @@ from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch
 from expdesign.simulation import Conduct, simulate, stopping, turning_circle, zigzag
-from expdesign.vessel import Vessel
+from expdesign.simulation.standard_trials import Trial
+from expdesign.vessel import Actuator, Limit, Response, Vessel
 from measured_trials import TUG, TUG_TRUE, as_batch, quiet, write_run
 from nomoto_ship import nomoto_ship
 from sample_files import OUTSIDE, outside
@@ -293,6 +295,48 @@ def test_a_stop_after_which_the_ship_sails_on_is_more_than_one_trial(ahead_s: in
     assert isinstance(found, Stop) == stops
     if not stops:
         assert "one trial in a file" in found.reason
+
+
+@pytest.mark.parametrize("earlier", [1.0, 0.6, 1.4])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_change_to_the_speed_of_the_approach_is_no_order_to_stop(earlier: float, noise: float) -> None:
+    """Its track reach counted from there."""
+    ship = nomoto_ship(sample_time_s=1.0)
+    commands, stop = stopping(ship, conduct=Conduct(speed_mps=7.0, approach_s=60.0, duration_s=600.0))
+    batch = as_batch(ship, commands, stop)
+    expected = measured_trial(ship, batch)
+    orders = np.array(batch.inputs)
+    orders[:20, 0] *= earlier
+    orders[:, 0] *= 1.0 + noise * np.random.default_rng(0).standard_normal(len(orders))
+    found = measured_trial(ship, replace(batch, inputs=orders))
+    assert isinstance(expected, Stop)
+    assert isinstance(found, Stop)
+    assert abs(found.track_reach_m - expected.track_reach_m) <= 2 * expected.tolerance_m
+
+
+@pytest.mark.parametrize("trial", [zigzag, turning_circle])
+@pytest.mark.parametrize("way", ["helm alone", "shafts slow down", "engines ordered anew", "tunnel thruster"])
+def test_turns_that_something_else_drives_are_no_standard_trials(trial: Callable[..., Trial], way: str) -> None:
+    """A run of thrusters in every direction was judged as a turning circle, by the mean of its azimuths."""
+    ship = nomoto_ship(sample_time_s=1.0)
+    bow = Actuator(
+        kind="tunnel", number=2, forward_m=30.0, limits=(Limit(low=-5.0, high=5.0),), responses=(Response(),)
+    )
+    angles = {} if trial is turning_circle else {"heading_rad": TWENTY, "helm_rad": TWENTY}
+    batch = as_batch(ship, *trial(ship, conduct=Conduct(speed_mps=7.0, approach_s=60.0), **angles))
+    inputs = np.column_stack([batch.inputs, np.zeros(len(batch))])
+    late = np.arange(len(batch)) > 80
+    if way == "shafts slow down":
+        inputs[late, 0] *= 0.7
+    if way == "engines ordered anew":
+        inputs[late, 0] *= 0.3
+    if way == "tunnel thruster":
+        inputs[late, 2] = -3.0
+    ship = replace(ship, model=replace(ship.model, actuators=(*ship.model.actuators, bow)))
+    found = measured_trial(ship, replace(batch, input_names=(*batch.input_names, "n2"), inputs=inputs))
+    assert isinstance(found, NotStandard) == (way in ("engines ordered anew", "tunnel thruster"))
+    if isinstance(found, NotStandard):
+        assert found.reason.startswith("the engine order" if "engines" in way else "the tunnel thruster n2")
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])

@@ -2,12 +2,13 @@
 
 A run is a stretch in which helm or engine orders act, with the approach before it. It ends where the helm is amidships
 and the engine order stands, for about the time in which a ship sails three of her lengths; what lies between two runs
-further than that is left out. With a plan, runs are where its commands are found again.
+further than that is left out. With a plan, runs are where its commands are found again, each with its approach, too.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -150,12 +151,15 @@ def _joined(parts: Sequence[Sequence[int]], pause: int) -> list[tuple[int, int]]
     return [(first, last) for first, last in found if last - first >= max(3, pause // 5)]
 
 
-def cut_by_plan(found: Sampled, commands: Commands, legs: Sequence[tuple[str, int, int]]) -> tuple[list[Run], str]:
+def cut_by_plan(
+    found: Sampled, commands: Commands, legs: Sequence[tuple[str, int, int]], *, length_m: float
+) -> tuple[list[Run], str]:
     """Runs of a plan by their names, and a sentence on where they were found.
 
     Args:
         found: with orders or positions of the same signals.
         legs: name, first and last sample of each run.
+        length_m: of the ship, some of which are the approach before a run's first order.
     """
     best: tuple[float, int, int] | None = None
     ratio = commands.sample_time_s / found.sample_time_s
@@ -182,12 +186,17 @@ def cut_by_plan(found: Sampled, commands: Commands, legs: Sequence[tuple[str, in
     explained, place, offset = best
     if explained < FOUND:
         return [], f"the plan's commands are not found in the log: they explain {explained:.0%} of its orders at best"
-    stretch, runs = found.stretches[place], []
+    stretch, runs, free = found.stretches[place], [], 0
+    pause = round(_pause_s(stretch, length_m) / found.sample_time_s)
     for name, first, last in legs:
-        begin, end = (offset + round(sample * ratio) for sample in (first, last))
-        part = stretch.cut(slice(max(begin, 0), max(min(end, len(stretch)), 0)))
-        if len(part) > 20:
-            runs.append(Run(name=name, family="as planned", stretch=part, approach_s=0.0))
+        begin, end = (min(max(offset + round(sample * ratio), 0), len(stretch)) for sample in (first, last))
+        start = max(free, begin - pause)
+        if end - begin > 20:
+            approach_s = (begin - start) * found.sample_time_s
+            runs.append(
+                Run(name=name, family="as planned", stretch=stretch.cut(slice(start, end)), approach_s=approach_s)
+            )
+        free = max(free, end)
     begins = offset * found.sample_time_s
     return runs, f"the plan begins {begins:.1f} s after the record; its commands explain {explained:.0%} of the orders"
 
@@ -198,8 +207,9 @@ def _orders(columns: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def file_name(number: int, run: Run) -> str:
-    """Of a run's CSV: its number and family, letters and digits only."""
-    words = "".join(c if c.isalnum() else "-" for c in (run.name or run.family or "run").lower())
+    """Of a run's CSV: its number and family, letters and digits only; of values below zero, "minus"."""
+    named = re.sub(r"(?<=-)-(?=[\d.])", "minus-", (run.name or run.family or "run").lower())
+    words = "".join(c if c.isalnum() else "-" for c in named)
     parts = [part for part in words.split("-") if part]
     while len("-".join(parts)) > LONGEST_NAME and len(parts) > 1:
         parts.pop()

@@ -36,6 +36,10 @@ TOLD_CURRENT_MPS = 0.1  # current by which is told what one that nobody removed 
 LEAST_HELM_RAD = math.radians(2.0)
 GONE_ON = 5.0  # ship lengths ahead after a stop, from which a record is of more than one trial
 TURNED_RAD = math.radians(80.0)
+ENGINE_HELD = 0.5  # change of the engine order, by that of the approach, within which a turn's is one; shafts slow down
+THRUSTER_STILL = 0.1  # share of a tunnel thruster's largest order below which it stands still
+ORDER_HELD = 0.1  # change, by its median, of an engine order that is held for half a ship length
+SELDOM = 0.2  # share of a turn in which either may be otherwise
 Samples = NDArray[np.intp]
 
 
@@ -70,7 +74,10 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     one_sided = len({stretch.level_rad > 0 for stretch in held}) == 1
     still = one_sided and held[0].order_s is None and turned < TURNED_RAD
     if held and not still:
-        return (_late if held[0].order_s is None else _steered)(vessel, run.until(held[-1].last), held)
+        trial = run.until(held[-1].last)
+        found = (_late if held[0].order_s is None else _steered)(vessel, trial, held)
+        pushed = _pushed(vessel, batch, trial, held[0].order_s)
+        return NotStandard(name=batch.name, reason=pushed) if pushed and not isinstance(found, NotStandard) else found
     helm = "no helm is held over"
     if still:
         helm = f"the helm stays at {_degrees(held[0].level_rad)} and the heading changes by {_degrees(turned)} only"
@@ -78,18 +85,18 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     if astern is None:
         return NotStandard(name=batch.name, reason=f"{helm}, and the engines are not ordered to stop")
     course, speed, remarks = _approach(run, astern)
-    found = read_stop(run, order_s=astern, course_rad=course, speed_mps=speed, rest_mps=AT_REST * speed)
-    if found is None or speed < _slow(run):
+    stop = read_stop(run, order_s=astern, course_rad=course, speed_mps=speed, rest_mps=AT_REST * speed)
+    if stop is None or speed < _slow(run):
         last = f"makes {run.velocity[-1, 0]:.2g} m/s ahead where the record ends"
         return NotStandard(name=batch.name, reason=f"{helm}, and the ship {last}")
-    gone_on = _ahead_again(run, astern + found.time_s)
+    gone_on = _ahead_again(run, astern + stop.time_s)
     if gone_on > GONE_ON:
         reason = (
-            f"the ship stops after {found.time_s + astern - run.time_s[0]:.0f} s and then sails {gone_on:.0f} ship "
+            f"the ship stops after {stop.time_s + astern - run.time_s[0]:.0f} s and then sails {gone_on:.0f} ship "
             "lengths ahead, expected one trial in a file"
         )
         return NotStandard(name=batch.name, reason=reason)
-    return replace(found, remarks=(*remarks, _over_ground("track reach and head reach", found.time_s)))
+    return replace(stop, remarks=(*remarks, _over_ground("track reach and head reach", stop.time_s)))
 
 
 def _steered_run(vessel: Vessel, batch: Batch, forward_m: float) -> SteeredRun:
@@ -202,6 +209,22 @@ def _left(run: SteeredRun, first: int, arrived: int, before: float, after: float
     middle = float(share @ time)
     width_s = math.sqrt(max(0.0, 12 * float(share @ (time - middle) ** 2) - 2 * run.sample_time_s**2))
     return max(float(run.time_s[0]), middle - width_s / 2)
+
+
+def _pushed(vessel: Vessel, batch: Batch, run: SteeredRun, order_s: float | None) -> str:
+    """Why a run with held helm is no standard turn: what else drives the ship round, or ""."""
+    turn = slice(int(np.searchsorted(run.time_s, run.time_s[0] if order_s is None else order_s)), len(run.time_s))
+    for one in vessel.actuators:
+        if one.kind == "tunnel" and one.signals[0] in batch.input_names:
+            pushes = np.abs(batch.inputs[: len(run.time_s), batch.input_names.index(one.signals[0])][turn])
+            if np.mean(pushes > THRUSTER_STILL * one.limits[0].high) > SELDOM:
+                return f"the tunnel thruster {one.signals[0]} pushes while the helm is held"
+    ordered = float(np.median(run.drive[max(turn.start - 2, 0) : turn.start + 3]))
+    other = np.abs(run.drive[turn] - ordered) > ENGINE_HELD * abs(ordered)
+    if np.mean(other) <= SELDOM:
+        return ""
+    low, high = np.quantile(run.drive[turn], [0.05, 0.95]).tolist()
+    return f"the engine order changes between {low:.2g} and {high:.2g} while the helm is held, expected one order"
 
 
 def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
@@ -355,13 +378,23 @@ def _slow(run: SteeredRun) -> float:
 
 
 def _astern(run: SteeredRun) -> float | None:
-    """When the engines leave their first order for one that is not ahead."""
-    first = float(np.median(run.drive[: max(3, len(run.drive) // 200)]))
+    """When the engines leave the last order that they held for one that is not ahead; the first, where they held none.
+
+    An earlier change of a speed ahead, to that of the approach, is no order to stop.
+    """
     stopped = np.flatnonzero(run.drive <= 0)
-    if first <= 0 or not len(stopped):
+    if not len(stopped) or not stopped[0]:
         return None
-    left = np.flatnonzero(np.abs(run.drive[: stopped[0] + 1] - first) > 0.02 * first)
-    return float(run.time_s[left[0]]) if len(left) else None
+    drive = run.drive[: stopped[0] + 1]
+    held = max(3, math.ceil(run.length_m / 2 / max(run.median_speed_mps, 1e-9) / run.sample_time_s))
+    begin = 0
+    if held < len(drive):
+        windows = np.lib.stride_tricks.sliding_window_view(drive, held)
+        steady = np.flatnonzero(np.ptp(windows, axis=1) <= ORDER_HELD * np.median(windows, axis=1))
+        begin = int(steady[-1]) if len(steady) else 0
+    first = float(np.median(drive[begin : begin + max(3, len(run.drive) // 200)]))
+    left = np.flatnonzero(np.abs(drive[begin:] - first) > 0.02 * first)
+    return float(run.time_s[begin + left[0]]) if first > 0 and len(left) else None
 
 
 def _ahead_again(run: SteeredRun, since_s: float) -> float:

@@ -313,7 +313,7 @@ def _runs(found: Sampled, track: object, length_m: float) -> tuple[list[Run], li
     if track is None:
         return cut(found, length_m=length_m), []
     legs = [(leg.name, leg.first, leg.last) for leg in track.legs if leg.kind == "primitive"]  # type: ignore[attr-defined]
-    runs, words = cut_by_plan(found, track.commands, legs)  # type: ignore[attr-defined]
+    runs, words = cut_by_plan(found, track.commands, legs, length_m=length_m)  # type: ignore[attr-defined]
     if not runs:
         raise NothingToWrite(words)
     return runs, [words]
