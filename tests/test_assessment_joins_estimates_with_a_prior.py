@@ -7,16 +7,19 @@ import numpy as np
 import pytest
 
 from expdesign import workflows
-from expdesign.assessment import EstimateOptions
-from expdesign.assessment.prior import held_for, released, with_prior
+from expdesign.assessment import EstimateOptions, assess
+from expdesign.assessment.prior import apart_from_stated, held_for, released, with_prior
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.values import into_range
 from expdesign.export.estimate_page import out_of_range
 from expdesign.export.files import vessel_toml
+from expdesign.records import load_records
+from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.vessel import Term, VesselModel
 from measured_trials import held, write_run
+from synthetic_ship import sail, trial, vessel_file, write
 
 TWIN_SCREW = Path(__file__).parents[1] / "expdesign" / "templates" / "twin-screw" / "vessel.toml"
 NAMES = ("X_u", "X_abs_u_u")
@@ -34,6 +37,10 @@ class Found:
     joint_covariance: np.ndarray
     warnings: tuple[str, ...] = ()
     between_runs: np.ndarray | float = 0.0
+
+    @property
+    def std(self) -> np.ndarray:
+        return np.sqrt(np.diag(self.covariance))
 
 
 def found(seed: int) -> Found:
@@ -264,3 +271,45 @@ def test_twin_screws_that_are_ordered_together_are_estimated_with_a_prior(tmp_pa
     joint = after.parameter_covariance[np.ix_(*[[place("X_T1"), place("X_T2")]] * 2)].sum() ** 0.5
     assert joint < 0.05 * 2 * model.parameters[place("X_T1")]
     assert "X_T2" in (tmp_path / "joined" / "estimate.json").read_text()
+
+
+INPUTS_AS_RECORDED = {
+    "as they are": ({}, ""),
+    "half": ({"n1_rps": 0.5}, "X_nn"),
+    "a tenth": ({"n1_rps": 0.1}, "X_nn"),
+    "a share of full speed": ({"n1_rps": 0.25}, "X_nn"),
+    "helm at half": ({"reached": 0.5}, "N_ud"),
+    "helm at a third, engine a fifth too high": ({"reached": 0.3, "n1_rps": 1.2}, "N_ud"),
+}
+
+
+@pytest.mark.parametrize("case", INPUTS_AS_RECORDED)
+def test_an_input_in_another_unit_makes_an_estimate_that_is_told_to_be_far_from_what_is_stated(
+    tmp_path: Path, case: str
+) -> None:
+    """The parameters take the factor up and the fit is as good; nothing but the vessel file can show it."""
+    factors, told = INPUTS_AS_RECORDED[case]
+    columns = sail(trial())
+    recorded = columns | {name: columns[name] * factor for name, factor in factors.items()}
+    ship = load_vessel(vessel_file(tmp_path / "ship.toml"))
+    ship = replace(ship, model=replace(ship.model, parameter_std=0.1 * np.abs(ship.model.parameters)))
+    data = write(tmp_path / "trial.csv", recorded, seed=1, reached="reached_rudder1_rad", rudder1_rad="")
+    record = reduced(load_records(data, vessel_inputs=ship.model.inputs), ship)
+    found = assess(ship, record, EstimateOptions(methods=("iv",), mean="none"))
+    said = [text for text in found.best.estimate.warnings if "times what the vessel file states" in text]
+    assert [text.split()[0] for text in said] == [told] * bool(told)
+    joined = assess(ship, record, EstimateOptions(methods=("iv",), mean="none", prior="parameter_std"))
+    assert not any("times what the vessel file states" in text for text in joined.best.estimate.warnings)
+
+
+@pytest.mark.thorough
+def test_estimates_of_a_ship_as_stated_are_not_told_to_be_far() -> None:
+    """True values drawn as stated and estimates as their covariance says: at most one in 10^4 of each is told."""
+    rng, model, told, draws = np.random.default_rng(3), known([0.1, 0.05]), 0, 4000
+    covariance = np.array([[0.04, 0.01], [0.01, 0.02]])
+    for _ in range(draws):
+        truth = model.parameters + rng.normal(size=2) * model.parameter_std
+        values = rng.multivariate_normal(truth, covariance)
+        one = replace(found(0), values=values, covariance=covariance)
+        told += bool(apart_from_stated(one, model))
+    assert told <= 4  # 2 x 6.3e-5 x 4000 = 0.5 expected; more than 4 has a chance below 2e-4

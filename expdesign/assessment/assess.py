@@ -17,7 +17,7 @@ from expdesign.assessment.actuator_times import (
 )
 from expdesign.assessment.held_out import HeldOut, ranked
 from expdesign.assessment.misfit import AHEAD_S, ESTIMATION, TEST, Limits, check_run, decomposed, one_step
-from expdesign.assessment.prior import PARAMETER_STD, check_prior, with_prior
+from expdesign.assessment.prior import PARAMETER_STD, apart_from_stated, check_prior, with_prior
 from expdesign.assessment.trials import (
     Trial,
     Work,
@@ -149,6 +149,10 @@ def assess(
         trials = _kept(trials, beside, ranked(compared))
     done = [_assessed(work, tests, trial) for trial in trials]
     chosen = preferred(done, compared)
+    if options.prior != PARAMETER_STD:  # with the prior, its contradiction is told of every method
+        best = done[chosen].estimate
+        best = replace(best, warnings=(*best.warnings, *apart_from_stated(best, vessel.model)))
+        done[chosen] = replace(done[chosen], estimate=best)
     decomposing("decomposing the misfit", 0.0)
     return Assessment(
         record=record,

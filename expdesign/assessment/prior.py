@@ -26,6 +26,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from expdesign.conventions import plus_minus
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.values import Estimate, into_range
 from expdesign.values import Array
@@ -37,6 +38,8 @@ CONTRADICTED = 0.01
 """Probability of the distance between prior and estimate below which a warning says that they contradict each other."""
 UNSEEN_STDS = 100.0
 """Standard deviations of the prior that stand for no knowledge; the posterior's variance is wrong by one in 10^4."""
+APART = 4.0
+"""Standard deviations of both from which an estimate is told to differ from what the vessel file states."""
 TOLD = 0.05
 """Share in a combination, in standard deviations, from which a note names a parameter."""
 
@@ -96,6 +99,33 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
         nuisance_values=values[count:],
         joint_covariance=joint,
         warnings=warnings,
+    )
+
+
+def apart_from_stated(found: Estimate, model: VesselModel) -> tuple[str, ...]:
+    """A sentence on the parameters of an estimate without prior that are not what the vessel file states; else none.
+
+    A channel in another unit, or of a shaft beyond a gear, is absorbed by its parameters without any misfit.
+    """
+    places = [model.names.index(name) for name in found.names]
+    stated, std = model.parameters[places], model.parameter_std[places]
+    known = std > 0
+    if not known.any():
+        return ()
+    scores = np.zeros(len(places))
+    scores[known] = (np.abs(found.values - stated) / np.hypot(found.std, std))[known]
+    worst = int(scores.argmax())
+    if scores[worst] < APART:
+        return ()
+    others = [found.names[place] for place in np.argsort(-scores)[1:] if scores[place] >= APART]
+    times = found.values[worst] / stated[worst] if stated[worst] else np.inf
+    size = f"{times:.3g} times what the vessel file states" if np.isfinite(times) else "where the vessel file states 0"
+    return (
+        f"{found.names[worst]} is estimated as {plus_minus(found.values[worst], found.std[worst])}, {size} "
+        f"({plus_minus(stated[worst], std[worst])}): {scores[worst]:.1f} standard deviations of both apart"
+        + (f", and so are {', '.join(others)} by {APART:g} or more" if others else "")
+        + ". A channel in another unit or of another shaft or sense, an effect that the model lacks, or a wrong "
+        "statement?",
     )
 
 

@@ -176,7 +176,7 @@ def estimate_document(found: Assessment, ship: Vessel) -> Document:
             *_methods(found),
             section("Current and wind", disturbance_table(found), DISTURBANCES),
             section("Samples used", used_samples(found)),
-            section("Methods without an estimate", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
+            section("Not estimated or not checked", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
         ),
         notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(found)),
     )
