@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib.util
 import inspect
 import json as json_text
-import math
 import os
 import secrets
 import warnings
@@ -38,6 +37,8 @@ if TYPE_CHECKING:
 
 def as_json(command: str, outcome: Outcome) -> str:
     """One JSON object: `command`, `files` written, and the document's `summary`, `verdict`, `findings` and `notes`."""
+    from expdesign.export.files.text import ready
+
     document = outcome.document
     content = {
         "command": command,
@@ -47,16 +48,7 @@ def as_json(command: str, outcome: Outcome) -> str:
         "findings": list(document.findings),
         "notes": list(document.all_notes),
     }
-    return json_text.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def _known(value: object) -> object:
-    """A value with null for numbers that are not finite, as in files of results."""
-    if isinstance(value, Mapping):
-        return {key: _known(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_known(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json_text.dumps(ready(content), indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def unverified(summary: Mapping[str, object]) -> str:

@@ -189,7 +189,7 @@ def _best_of_each_cause(tests: Sequence[ScoreTest]) -> list[ScoreTest]:
     found: dict[str, ScoreTest] = {}
     for test in sorted(tests, key=lambda item: SELECTION_TUNING.price * item.candidate.size - item.statistic):
         if test.statistic >= least - SELECTION_TUNING.statistic_margin:
-            found.setdefault(_kind(test.candidate), test)
+            found.setdefault(test.candidate.cause.split(":")[0], test)
     return [*found.values()][: SELECTION_TUNING.shortlist]
 
 
@@ -197,11 +197,6 @@ def _values_tried(point: StartingPoint, candidates: Sequence[Candidate]) -> int:
     """How many values of an effect were tried that the fit holds, as the time of a change: of what is held out, too."""
     own = point.test.candidate
     return 1 if own.grid is None else sum(one.cause == own.cause and {*one.free} == {*own.free} for one in candidates)
-
-
-def _kind(candidate: Candidate) -> str:
-    """Its entry in the catalogue, which holds any missing term."""
-    return candidate.cause.split(":")[0]
 
 
 def _fitted(base: Fit, test: ScoreTest) -> tuple[StartingPoint, Fit, HeldOut] | None:

@@ -276,15 +276,12 @@ def _strata(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: Worst
     strata = np.concatenate(found)
     for output, column_of in zip(model.outputs, strata.T, strict=True):
         if not column_of.any():
-            raise NotInformative(_nothing_left(output, tuple(dict.fromkeys(insides[output]))))
+            raise NotInformative(
+                f"no sample keeps {' and '.join(dict.fromkeys(insides[output]))} clear of zero, as the absolute values "
+                f"of d{output}/dt need in equation-wise samples; expected data with more offset, a smaller --offset, "
+                "or --samples all"
+            )
     return strata
-
-
-def _nothing_left(output: str, insides: Sequence[str]) -> str:
-    return (
-        f"no sample keeps {' and '.join(insides)} clear of zero, as the absolute values of d{output}/dt need in "
-        "equation-wise samples; expected data with more offset, a smaller --offset, or --samples all"
-    )
 
 
 def sample_notes(residuals: Residuals) -> tuple[str, ...]:

@@ -314,7 +314,7 @@ def _finding(found: Diagnosis, index: int) -> Section:
         f"{name} {_fit(float(a))} \N{RIGHTWARDS ARROW} {_fit(float(b))}"
         for name, a, b in zip(found.before.outputs, item.fit_before, item.fit_after, strict=True)
     )
-    reductions = [_reduction(one) for one in item.error_reductions if np.isfinite(one.share)]
+    reductions = [(f"{one.output} {_share(one)}") for one in item.error_reductions if np.isfinite(one.share)]
     low, high = item.gain_interval
     nb = words.NB
     rows = [
@@ -375,10 +375,6 @@ def _with_error(item: Estimate) -> str:
 
 def _says(item: Estimate) -> str:
     return "" if item.stated is None else f"the file says {words.significant(item.stated, 4)}"
-
-
-def _reduction(item: ErrorReduction) -> str:
-    return f"{item.output} {_share(item)}"
 
 
 def _share(item: ErrorReduction) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from expdesign.conventions import plus_minus
 from expdesign.diagnosis import Accuracy, Diagnosis, Estimate, Finding, Unexplained
 from expdesign.diagnosis.accuracy import Residuals, dependence
-from expdesign.export.files import finite, strict_json, vessel_toml
+from expdesign.export.files import entry, finite, strict_json, vessel_toml
 from expdesign.export.files.text import named_finite
 from expdesign.export.roll_changes import RollVerdict, roll_entry, roll_sentences, with_roll
 
@@ -37,10 +37,7 @@ def _unexplained(found: Unexplained) -> dict[str, Any]:
     return {
         "fit": named_finite(found.outputs, found.fit),
         "force_share": named_finite(found.outputs, found.force_share),
-        "candidates": [
-            {"cause": lead.cause, "gain": finite(lead.gain), "gain_interval": [finite(x) for x in lead.gain_interval]}
-            for lead in found.leads
-        ],
+        "candidates": [entry(lead, "cause", "gain", "gain_interval") for lead in found.leads],
     }
 
 
@@ -88,11 +85,7 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
             }
             for reduction in item.error_reductions
         },
-        "gain": finite(item.gain),
-        "gain_interval": [finite(value) for value in item.gain_interval],
-        "not_distinguishable_from": list(item.not_distinguishable_from),
-        "would_tell_apart": item.would_tell_apart,
-        "explanation": item.explanation,
+        **entry(item, "gain", "gain_interval", "not_distinguishable_from", "would_tell_apart", "explanation"),
     }
 
 

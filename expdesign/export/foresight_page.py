@@ -11,7 +11,7 @@ import numpy as np
 
 from expdesign.export import words
 from expdesign.export.document import Document, Figure, Table, filled, section
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import entry, finite, strict_json
 from expdesign.export.pages.figures import (
     BLUE,
     GREY,
@@ -125,9 +125,7 @@ def foresight_json(found: Foresight, *, scenario: str, vessel: str, source: str)
             "scenario": scenario,
             "vessel": vessel,
             "trial": source,
-            "duration_s": found.duration_s,
-            "wanted_power": found.wanted_power,
-            "random_current_mps": found.random_current_mps,
+            **entry(found, "duration_s", "wanted_power", "random_current_mps"),
             "effects": [effect_entry(item) for item in found.effects],
             "missed": list(found.missed),
             "conclusions": list(conclusions(found)),
@@ -149,22 +147,11 @@ def foresight_json(found: Foresight, *, scenario: str, vessel: str, source: str)
 def effect_entry(item: Foreseen) -> dict[str, object]:
     """One effect."""
     return {
-        "cause": item.cause,
+        **entry(item, "cause", "unit", "rule", "noncentrality", "freedom", "level", "power", "found", "named"),
         "effect": item.name,
         "size": finite(item.change),
-        "unit": item.unit,
-        "rule": item.rule,
-        "noncentrality": finite(item.noncentrality),
-        "freedom": item.freedom,
-        "level": item.level,
-        "power": finite(item.power),
-        "found": finite(item.found),
-        "named": finite(item.named),
         "size_for_wanted_power": finite(item.least_change),
-        "mistaken_for": [
-            {"cause": other.cause, "cosine": other.cosine, "told_apart": other.told_apart}
-            for other in item.mistaken_for
-        ],
+        "mistaken_for": [entry(other, "cause", "cosine", "told_apart") for other in item.mistaken_for],
         "added_runs": _added(item.added),
         "best_power": finite(item.best_power),
     }

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from expdesign.export import words
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import entry, finite, strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
 from expdesign.particulars import Expected
@@ -193,19 +193,13 @@ def indices_json(content: IndicesContent) -> str:
             "verdicts": [
                 {
                     "source": source,
-                    "run": verdict.run,
-                    "side": verdict.side,
+                    **entry(verdict, "run", "side", "value", "tolerance", "met"),
                     "index": verdict.criterion.key,
-                    "name": verdict.criterion.name,
-                    "value": verdict.value,
-                    "tolerance": verdict.tolerance,
-                    "limit": verdict.criterion.limit,
-                    "rule": verdict.criterion.rule,
-                    "met": verdict.met,
+                    **entry(verdict.criterion, "name", "limit", "rule"),
                 }
                 for source, verdict in content.verdicts
             ],
-            "held": {"depth_m": content.depth_m, "wind_mps": content.wind_mps, "sea_state": content.sea_state},
+            "held": entry(content, "depth_m", "wind_mps", "sea_state"),
             "notes": list(content.notes),
         }
     )

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from expdesign.export import words
 from expdesign.export.document import Document, Items, Section, Table, filled, notes_of, section, verdict
+from expdesign.export.files import entry
 from expdesign.export.indices_form import (
     IndicesContent,
     degrees,
@@ -106,6 +107,9 @@ def indices_document(content: IndicesContent) -> Document:
     refused = sum(isinstance(item, NotStandard) for item in content.measured)
     measured = {"measured_runs": len(content.measured), "measured_runs_without_result": refused}
     found = content.simulated
+    circles = [_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)]
+    zigzags = [_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)]
+    stops = [_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)]
     return Document(
         kind="Manoeuvring indices of IMO resolution MSC.137(76), in the form of MSC/Circ.1053, appendix 6",
         title=content.vessel.name,
@@ -128,9 +132,9 @@ def indices_document(content: IndicesContent) -> Document:
                 section(f"Results, {source}", Table(header=FORM, rows=form_rows(content, source), texts=5, on="page"))
                 for source in sources
             ),
-            section("Turning circles", Table(header=CIRCLES, rows=_circles(content), texts=4, on="page")),
-            section("Zig-zags", Table(header=ZIGZAGS, rows=_zigzags(content), texts=6)),
-            section("Stopping", Table(header=STOPS, rows=_stops(content), texts=3, on="page")),
+            section("Turning circles", Table(header=CIRCLES, rows=circles, texts=4, on="page")),
+            section("Zig-zags", Table(header=ZIGZAGS, rows=zigzags, texts=6)),
+            section("Stopping", Table(header=STOPS, rows=stops, texts=3, on="page")),
             section(
                 "How sure the simulated results are", Table(header=SURE, rows=sure_rows(content), texts=2), SURENESS
             ),
@@ -175,7 +179,7 @@ def _values(content: IndicesContent) -> dict[str, object]:
         },
         "results": {
             f"{source} {v.run}: {v.criterion.key}": {
-                "value": v.value, "tolerance": v.tolerance, "limit": v.criterion.limit, "met": v.met
+                **entry(v, "value", "tolerance", "met"), "limit": v.criterion.limit
             }
             for source, v in content.verdicts
         },
@@ -318,10 +322,6 @@ def _with_tolerance(value: float | None, tolerance_m: float) -> str:
     return shown("_m", value, tolerance_m).removesuffix(" m") if value is not None else ""
 
 
-def _circles(content: IndicesContent) -> list[tuple[str, ...]]:
-    return [_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)]
-
-
 def _circle(source: str, trial: Circle) -> tuple[str, ...]:
     advance = _with_tolerance(trial.advance_m, trial.tolerance_m)
     lengths = (trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
@@ -332,19 +332,11 @@ def _circle(source: str, trial: Circle) -> tuple[str, ...]:
     return (*head, *(_metres(length) for length in lengths), current)
 
 
-def _zigzags(content: IndicesContent) -> list[tuple[str, ...]]:
-    return [_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)]
-
-
 def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
     executes = ", ".join(f"{order.time_s:.1f} s at {degrees(order.heading_rad)}" for order in trial.executes)
     initial = _with_tolerance(trial.initial_turning_m, trial.tolerance_m)
     head = (source, trial.name, trial.side, _speed(trial.speed_mps), overshoots(trial), executes)
     return (*head, f"{degrees(trial.heading_rad)} / {degrees(trial.helm_rad)}", initial)
-
-
-def _stops(content: IndicesContent) -> list[tuple[str, ...]]:
-    return [_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)]
 
 
 def _stop(source: str, trial: Stop) -> tuple[str, ...]:

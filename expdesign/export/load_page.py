@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.export.document import Document, Listing, Table, section
-from expdesign.export.files import finite, strict_json, toml_comments, toml_table
+from expdesign.export.files import entry, finite, strict_json, toml_comments, toml_table
 from expdesign.export.words import counted, ship
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
@@ -131,8 +131,7 @@ def load_plan_json(content: LoadContent) -> str:
                     "name": option.name,
                     "unknown": option.load is None,
                     **({} if option.load is None else {
-                        "mass_kg": option.load.mass_kg, "height_m": -option.load.z_m,
-                        "inertia_kgm2": option.load.inertia_kgm2,
+                        **entry(option.load, "mass_kg", "inertia_kgm2"), "height_m": -option.load.z_m,
                     }),
                     "runs": content.runs(case),
                     "time_s": content.time_s(case),

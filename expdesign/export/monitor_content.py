@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import entry, finite, strict_json
 from expdesign.export.roll_changes import watch_entry, watch_sentences
 from expdesign.export.words import HOUR, counted, hours, percent, times, told_apart, when
 from expdesign.monitoring import (
@@ -427,9 +427,7 @@ def _call_entry(content: MonitorContent, call: Call) -> dict[str, object]:
 def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
     change = content.changes[alarm.change]
     return {
-        "time_s": alarm.time_s,
-        "since_s": alarm.since_s,
-        "statistic": alarm.statistic,
+        **entry(alarm, "time_s", "since_s", "statistic", "settled"),
         "effect": change.effect,
         "value": alarm.value * change.size,
         "std": alarm.std * change.size,
@@ -437,5 +435,4 @@ def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
         "as_likely": [content.changes[number].effect for number in alarm.as_likely],
         "as_likely_pushes": pushed(content, alarm),
         "likelier_pushes": pushed(content, alarm, beyond=AS_LIKELY),
-        "settled": alarm.settled,
     }

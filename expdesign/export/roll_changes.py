@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from expdesign.conventions import plus_minus
 from expdesign.export import words
-from expdesign.export.files import finite
+from expdesign.export.files import entry
 from expdesign.roll import G_MPS2, UNITS
 from expdesign.roll.record import CAUSES, LOAD, RollChange, RollJudgement
 from expdesign.vessel import RollPendulum, Vessel
@@ -124,28 +124,22 @@ def roll_entry(roll: RollVerdict | None) -> dict[str, Any]:
     """The entry of roll in diagnosis.json; nothing for a vessel file without [roll]."""
     if roll is None:
         return {}
-    entry: dict[str, Any] = {"verdict": list(roll_sentences(roll))}
+    told: dict[str, Any] = {"verdict": list(roll_sentences(roll))}
     found = roll.judgement
     if found is not None:
-        entry |= {
+        told |= {
             "p_value": found.p_value,
             "changed": found.changed,
             "alarm_below": found.alarm_p,
-            "explanations": [_change(one) for one in found.changes],
+            "explanations": [
+                {"causes": _causes(one), **entry(one, "p_value", "righting_nm"), "load": _loaded(one.load)}
+                for one in found.changes
+            ],
             "estimate": {
                 name: {"value": found.estimate.values[name], "std": std} for name, std in found.estimate.std.items()
             },
         }
-    return {"roll": entry}
-
-
-def _change(one: RollChange) -> dict[str, Any]:
-    return {
-        "causes": _causes(one),
-        "p_value": one.p_value,
-        "righting_nm": one.righting_nm,
-        "load": _loaded(one.load),
-    }
+    return {"roll": told}
 
 
 def _causes(one: RollChange | RollEvent) -> dict[str, dict[str, float]]:
@@ -207,24 +201,20 @@ def watch_entry(watch: RollWatch | None, *, false_alarm_days: float) -> dict[str
     """The entry of roll in monitor.json; nothing for a vessel file without [roll]."""
     if watch is None:
         return {}
-    entry = {
+    told = {
         "verdict": list(watch_sentences(watch, false_alarm_days=false_alarm_days)),
         "judged_h": watch.judged_s / words.HOUR,
         "not_judged_h": watch.left_out_s / words.HOUR,
         "changes": [_event_entry(event) for event in watch.events],
     }
-    return {"roll": entry}
+    return {"roll": told}
 
 
 def _event_entry(event: RollEvent) -> dict[str, Any]:
     return {
-        "since_s": event.since_s,
-        "time_s": event.time_s,
+        **entry(event, "since_s", "time_s", "settled", "p_value", "righting_nm"),
         "alarm": not event.after_call,
-        "settled": event.settled,
-        "p_value": event.p_value,
         "causes": _causes(event),
         "load": _loaded(event.load),
-        "righting_nm": [finite(value) for value in event.righting_nm],
         "as_likely": [list(causes) for causes in event.others],
     }

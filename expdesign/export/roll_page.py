@@ -11,7 +11,7 @@ from markupsafe import Markup
 from expdesign import __version__
 from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Mark, Table, filled, section
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import entry, finite, strict_json
 from expdesign.export.words import percent
 from expdesign.roll import (
     EFFECTS,
@@ -248,17 +248,13 @@ def roll_json(content: RollContent) -> str:
             "method": estimate.method,
             "parameters": {name: _parameter(content, name) for name in estimate.values},
             "null_space": {
-                "free": list(report.free),
-                "rank": report.rank,
-                "singular_values": report.singular_values.tolist(),
+                **entry(report, "free", "rank", "singular_values"),
                 "open": [one.change for one in report.open],
                 "faint": [{"change": one.change, "relative_std": 1.0 / one.size} for one in report.faint],
                 "cures": [vars(one) for one in report.cures],
             },
             "filter": {
-                "bandwidth_hz": content.filter.bandwidth_hz,
-                "roll_hz": content.filter.roll_hz,
-                "passed": content.filter.passed,
+                **entry(content.filter, "bandwidth_hz", "roll_hz", "passed"),
                 "sample_time_s": content.filter.step_s,
             },
             **({} if content.scale is None else {"at_full_scale": _scaled(content)}),

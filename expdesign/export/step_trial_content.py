@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.conventions import plus_minus
 from expdesign.export.document import Table
-from expdesign.export.files import finite, named_finite, strict_json
+from expdesign.export.files import entry, finite, named_finite, strict_json
 from expdesign.export.words import counted
 from expdesign.step_trials import CHANNELS, NO_BEND, StepSample, StepTrial, Surface
 from expdesign.step_trials.live import StepList
@@ -315,8 +315,5 @@ def _step(content: StepTrialContent, one: StepSample) -> dict[str, object]:
         "time_constant_std_s": None if response is None else finite(constant_std_s(content, one)),
         "damping_ratio": None if response is None else response.damping,
         "zero_s": None if response is None else response.zero_s,
-        "inertia": finite(one.inertia),
-        "inertia_std": finite(one.inertia_std),
-        "problems": list(one.problems),
-        "remarks": list(one.remarks),
+        **entry(one, "inertia", "inertia_std", "problems", "remarks"),
     }

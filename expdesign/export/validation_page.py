@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from expdesign.estimation.methods import METHODS, method_named
 from expdesign.export import words
 from expdesign.export.document import Document, Figure, Section, Table, section
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import entry, finite, strict_json
 from expdesign.export.pages.figures import (
     BLUE,
     GREY,
@@ -211,12 +211,7 @@ def validation_json(rehearsal: Rehearsal, results: Sequence[Validated], *, scena
     described = {
         "scenario": scenario,
         "truth": rehearsal.truth.name,
-        "method": rehearsal.method,
-        "mean_subtraction": rehearsal.mean_subtraction,
-        "excitation": rehearsal.excitation,
-        "integrator": rehearsal.integrator,
-        "trials": rehearsal.trials,
-        "seed": rehearsal.seed,
+        **entry(rehearsal, "method", "mean_subtraction", "excitation", "integrator", "trials", "seed"),
         "designs": {item.design: _entry(rehearsal, item) for item in results},
         "judgements": list(judged),
     }

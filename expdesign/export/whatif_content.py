@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.export.files import strict_json
+from expdesign.export.files import entry, strict_json
 from expdesign.export.words import NOTICED, percent, significant
 from expdesign.values import Array
 
@@ -220,10 +220,7 @@ def _entry(content: WhatIfContent, case: Case, sentences: tuple[str, ...]) -> di
         "name": case.name,
         "changes": list(case.changes),
         "problem": None,
-        "criterion": case.criterion,
-        "runs": dict(case.runs),
-        "informative_s": case.informative_s,
-        "gap_relative": case.gap_relative,
+        **entry(case, "criterion", "runs", "informative_s", "gap_relative"),
         "efficiency": dict(case.efficiencies),
         "std": dict(zip(case.parameters, case.std.tolist(), strict=True)),
         "accuracy": None if against is None else against.accuracy,

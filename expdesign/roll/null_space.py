@@ -94,10 +94,6 @@ def _sizes(estimate: RollEstimate) -> Array:
     return theta
 
 
-def _places(free: Sequence[str]) -> list[int]:
-    return [PARAMETERS.index(name) for name in free]
-
-
 def _singular(matrix: Array) -> tuple[Array, Array]:
     """Singular values, one for each column, and right singular vectors in rows."""
     _, sizes, rows = np.linalg.svd(matrix, full_matrices=True)
@@ -110,7 +106,7 @@ def _rank(sizes: Array) -> int:
 
 def direction(free: Sequence[str], theta: Array, relative: Array, size: float) -> Direction:
     """The direction of relative changes (p,) of the free parameters, at parameters (9,)."""
-    values = theta[_places(free)]
+    values = theta[[PARAMETERS.index(name) for name in free]]
     largest = int(np.argmax(np.abs(relative)))
     moved = relative / relative[largest] * 0.1
     if moved[0] * values[0] < 0:

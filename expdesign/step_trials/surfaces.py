@@ -62,11 +62,6 @@ class Fit:
     held_out: float  # weighted root mean square error of cross-validation, unit of the values
 
 
-def best_fit(samples: Sampled) -> Fit:
-    """Ridge or lasso, whichever predicts what was held out better."""
-    return min((ridge(samples), lasso(samples)), key=lambda fit: fit.held_out)
-
-
 def ridge(samples: Sampled, penalties: tuple[float, ...] = PENALTIES) -> Fit:
     """Ridge regression with the penalty of the least leave-one-out error, in closed form."""
     errors = [_left_out_error(samples, penalty) for penalty in penalties]
@@ -195,7 +190,7 @@ def fitted_surface(
     weights = np.ones(len(values)) if weights is None else weights
     sampled = {bend: _sampled(states, values, weights, powers, bend) for bend in candidates}
     best = min(candidates, key=lambda bend: ridge(sampled[bend]).held_out)
-    fit = best_fit(sampled[best])
+    fit = min((ridge(sampled[best]), lasso(sampled[best])), key=lambda fit: fit.held_out)
     return Surface(powers=powers, bend=best, fit=fit, least=float(values.min()), most=float(values.max()))
 
 

@@ -173,7 +173,7 @@ def verdict(
         sentences = [f"Look at the record first: {faults[0].rstrip('.')}", *known]
     if confirmed:
         sentences = [*confirmed, *(text.replace(NO_ERROR, NO_ERROR.replace("no", "no other")) for text in sentences)]
-    return _sentences(sentences)
+    return " ".join(text if text.endswith("?") else f"{text}." for text in sentences)
 
 
 NO_ERROR = "These data show no error of the model"
@@ -288,10 +288,6 @@ def _with_units(unexplained: Unexplained | None, signs: Sequence[Lead], unit: st
     of_remainder = [] if unexplained is None else [(lead, unexplained.unit) for lead in unexplained.leads]
     both = sorted([*((sign, unit) for sign in signs), *of_remainder], key=lambda pair: pair[0].gain)
     return [*{lead.cause: (lead, of) for lead, of in both if lead.gain > 0.0}.values()][::-1]
-
-
-def _sentences(texts: Sequence[str]) -> str:
-    return " ".join(text if text.endswith("?") else f"{text}." for text in texts)
 
 
 def _capital(text: str) -> str:

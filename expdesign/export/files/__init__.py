@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         track_csv,
     )
     from expdesign.export.files.text import (
+        entry,
         finite,
         named_finite,
         record_csv,

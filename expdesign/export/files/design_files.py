@@ -17,6 +17,7 @@ from expdesign.dictionary.spec import Primitive, PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, bordered, limits_kept, pool_gains
 from expdesign.export.files.text import (
     csv_text,
+    entry,
     finite,
     named,
     named_finite,
@@ -64,10 +65,7 @@ def _primitive_entry(item: PrimitiveInformation, vessel: Vessel) -> dict[str, An
     primitive = item.primitive
     forward, starboard, turn = primitive.displacement.tolist()
     return {
-        "name": primitive.name,
-        "family": primitive.family,
-        "settings": dict(primitive.settings),
-        "duration_s": primitive.duration_s,
+        **entry(primitive, "name", "family", "settings", "duration_s"),
         "start": named(VELOCITY_COLUMNS, primitive.entry_velocity),
         "end": named(VELOCITY_COLUMNS, primitive.exit_velocity),
         "displacement": {"forward_m": forward, "starboard_m": starboard, "turn_rad": turn},
@@ -75,11 +73,7 @@ def _primitive_entry(item: PrimitiveInformation, vessel: Vessel) -> dict[str, An
         "excitation_condition": bool(item.excitation_condition),
         "excitation_condition_by_equation": dict(item.excites),
         "excitation_share_by_equation": dict(item.clear_share),
-        "X": item.X.tolist(),
-        "Y": item.Y.tolist(),
-        "Z": item.Z.tolist(),
-        "YZ": item.YZ.tolist(),
-        "log_det_alone": item.log_det_alone,
+        **entry(item, "X", "Y", "Z", "YZ", "log_det_alone"),
     }
 
 
@@ -113,10 +107,7 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
             "criterion": problem.aim.criterion,
             "mean_subtraction": problem.mean_subtraction,
             "total_s": problem.total_s,
-            "log_det": design.log_det,
-            "log_det_bound": finite(design.log_det_bound),
-            "gap": finite(design.gap),
-            "gap_relative": finite(design.gap_relative),
+            **entry(design, "log_det", "log_det_bound", "gap", "gap_relative"),
             "dimension": problem.dimension,
             "parameters": list(problem.parameters),
             "primitives": [
@@ -146,10 +137,7 @@ def _certificate_entry(design: DurationDesign) -> dict[str, Any]:
     proof = design.certificate
     return {
         "theorem": proof.kind,
-        "value": proof.value,
-        "bound": finite(proof.bound),
-        "degree": proof.degree,
-        "level": proof.level,
+        **entry(proof, "value", "bound", "degree", "level"),
         "mixture_of_models": proof.mixture.tolist() if design.problem.robust != "nominal" else None,
         "multipliers": dict(proof.multipliers),
         "guaranteed_log_det": finite(proof.guaranteed),
@@ -200,9 +188,7 @@ def growth_json(growth: Growth) -> str:
             "efficiency_at_least_among_candidates": growth.efficiency_left,
             "rounds": [
                 {
-                    "name": row.name,
-                    "family": row.family,
-                    "settings": dict(row.settings),
+                    **entry(row, "name", "family", "settings"),
                     "sensitivity_before": row.sensitivity,
                     "sensitivity_of_family_member": row.searched,
                     "log_det_gain": row.log_det_gain,
@@ -249,10 +235,7 @@ def recorded_dictionary_json(
             "family": "recorded",
             "pieces": pieces[item.name],
             "duration_s": item.seconds,
-            "samples": item.samples,
-            "X": item.X.tolist(),
-            "Y": item.Y.tolist(),
-            "Z": item.Z.tolist(),
+            **entry(item, "samples", "X", "Y", "Z"),
             "log_det_alone": _log_det(item, mean_subtraction),
             "gain_beside_pool": finite(gain),
         }

@@ -20,7 +20,7 @@ from expdesign.estimation.solve import Direction
 from expdesign.export import words
 from expdesign.export.document import Table
 from expdesign.export.files.disturbances import disturbance_entries
-from expdesign.export.files.text import finite, named_finite, strict_json, valued
+from expdesign.export.files.text import entry, finite, named_finite, strict_json, valued
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.vessel import Vessel
 
@@ -257,15 +257,15 @@ def limit_entries(found: Assessment) -> dict[str, Any]:
     """Run -> causes of misfit of its simulation with the chosen estimate: numbers and a sentence."""
     shares, ahead = ("constant", "slow", "quick", "parameters", "ceiling_percent"), ("ahead_rms", "ahead_share")
 
-    def entry(limits: Limits, name: str) -> dict[str, float | None]:
+    def by_output(limits: Limits, name: str) -> dict[str, float | None]:
         return named_finite(limits.outputs, getattr(limits, name))
 
     return {
         run.batch.name: {
             "sentence": sentence(limits, run),
             # an error that has grown many times over has no shares that add up
-            **{name: None if limits.unstable else entry(limits, name) for name in shares},
-            **{name: entry(limits, name) for name in ahead},
+            **{name: None if limits.unstable else by_output(limits, name) for name in shares},
+            **{name: by_output(limits, name) for name in ahead},
             "growth_of_an_error": finite(limits.growth),
             "doubling_s": finite(limits.doubling_s),
         }
@@ -343,9 +343,7 @@ def _direction(direction: Direction) -> dict[str, Any]:
 def _breach(breach: Breach) -> dict[str, Any]:
     return {
         "run": breach.batch,
-        "inside": breach.inside,
-        "parameters": list(breach.parameters),
-        "margin": finite(breach.margin),
+        **entry(breach, "inside", "parameters", "margin"),
         "samples": len(breach.samples),
         "of": breach.count,
         "sentence": str(breach),

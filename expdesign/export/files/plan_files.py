@@ -16,7 +16,7 @@ import numpy as np
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.durations import DurationProblem
 from expdesign.errors import NoAnswer, NotInformative
-from expdesign.export.files.text import csv_text, finite, named, sample_seconds, strict_json
+from expdesign.export.files.text import csv_text, entry, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate, UnderWay
@@ -149,7 +149,7 @@ def plan_json(
         {
             **({"draft": True} if plan.draft else {}),
             "scenario": scenario,
-            "vessel": {"name": vessel.name, "length_m": vessel.length_m, "beam_m": vessel.beam_m},
+            "vessel": entry(vessel, "name", "length_m", "beam_m"),
             "sample_time_s": plan.commands.sample_time_s,
             "inputs": list(plan.commands.names),
             "frame": {
@@ -176,17 +176,11 @@ def plan_json(
             "leave_water_probability": plan.leave_water_probability,
             "drawn_trials": _risk_entry(plan.risk),
             **({} if accuracy is None else {"parameters": accuracy_entries(accuracy)}),
-            "design_efficiency_placed": plan.design_efficiency_placed,
-            "design_efficiency_realised": plan.design_efficiency_realised,
+            **entry(plan, "design_efficiency_placed", "design_efficiency_realised", "verified", "verdict"),
             **({} if check.heel_max_rad is None else {"heel_max_rad": check.heel_max_rad}),
-            "verified": plan.verified,
-            "verdict": plan.verdict,
             "verification": {
-                "clearance_time_s": check.clearance_time_s,
-                "reproduction_error_m": check.reproduction_error_m,
+                **entry(check, "clearance_time_s", "reproduction_error_m", "limit_excess", "problems"),
                 **({} if check.stretch_s is None else {"stretch_s": check.stretch_s}),
-                "limit_excess": check.limit_excess,
-                "problems": list(check.problems),
             },
         }
     )
@@ -195,11 +189,7 @@ def plan_json(
 def _lattice_entry(proof: LatticeProof) -> dict[str, Any]:
     """The proof of the lattice planner, and its scope."""
     return {
-        "spacing_m": proof.spacing_m,
-        "headings": proof.headings,
-        "cost_s": proof.cost_s,
-        "lower_bound_s": proof.lower_bound_s,
-        "gap": proof.gap,
+        **entry(proof, "spacing_m", "headings", "cost_s", "lower_bound_s", "gap"),
         "places_refused": proof.refused,
         "meaning": LATTICE_SENTENCE,
     }
@@ -396,21 +386,16 @@ def replan_json(known: Known) -> str:
     current, wind = known.environment.current_to.tolist(), known.environment.wind_to.tolist()
     return strict_json(
         {
-            "data": list(known.data),
-            "sailed_s": known.sailed_s,
+            **entry(known, "data", "sailed_s", "remaining_s", "remaining_stated", "model", "notes"),
             "whole_trial_s": known.total_s,
-            "remaining_s": finite(known.remaining_s),
-            "remaining_stated": known.remaining_stated,
             "start": dict(zip(POSE_COLUMNS, known.pose.tolist(), strict=True)),
             "measured_speed_mps": known.speed_mps,
             "begins_with": None if moves is None else dict(zip(VELOCITY_COLUMNS, moves.velocity.tolist(), strict=True)),
-            "model": known.model,
             "environment": {
                 "from": known.weather,
                 "current_to": {"north_mps": current[0], "east_mps": current[1]},
                 "wind_to": {"north_mps": wind[0], "east_mps": wind[1]},
             },
-            "notes": list(known.notes),
             "parameters": {name: _entry(*row) for name, *row in columns},
         }
     )

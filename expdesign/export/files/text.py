@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -59,6 +59,22 @@ def valued(names: Sequence[str], values: Array, stds: Array) -> dict[str, dict[s
 def finite(value: float) -> float | None:
     """The value, or None (null) where it is not a number."""
     return float(value) if math.isfinite(value) else None
+
+
+def entry(value: object, *names: str) -> dict[str, Any]:
+    """Attributes of a value by their names, ready for JSON: null where a number is not finite."""
+    return {name: ready(getattr(value, name)) for name in names}
+
+
+def ready(value: Any) -> Any:
+    """Numbers, texts, lists and tables as JSON has them, with null for numbers that are not finite."""
+    if isinstance(value, np.ndarray):
+        return ready(value.tolist())
+    if isinstance(value, Mapping):
+        return {key: ready(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [ready(item) for item in value]
+    return finite(value) if isinstance(value, float) else value
 
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")

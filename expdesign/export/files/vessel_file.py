@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.export.files.text import toml_comments, toml_key, toml_table, toml_value
+from expdesign.export.files.text import entry, toml_comments, toml_key, toml_table, toml_value
 from expdesign.values import Array
 from expdesign.vessel import (
     EXACT,
@@ -58,11 +58,7 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
 
 
 def _actuator(actuator: Actuator) -> dict[str, str | float]:
-    entries: dict[str, str | float] = {
-        "kind": actuator.kind,
-        "forward_m": actuator.forward_m,
-        "starboard_m": actuator.starboard_m,
-    }
+    entries = entry(actuator, "kind", "forward_m", "starboard_m")
     for stem, limit, response in zip(KINDS[actuator.kind], actuator.limits, actuator.responses, strict=True):
         values = zip(limit_keys(stem), (limit.low, limit.high), strict=True)
         entries |= {key: value for key, value in values if math.isfinite(value)}

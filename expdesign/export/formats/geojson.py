@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
-from expdesign.export.files import strict_json
+from expdesign.export.files import entry, strict_json
 from expdesign.export.formats.format import Format, route_file
 from expdesign.export.routes import Route, Waypoint
 
@@ -48,13 +48,8 @@ def _line(leg: int, chords: list[tuple[Waypoint, Waypoint]]) -> dict[str, Any]:
 def _point(route: Route, waypoint: Waypoint) -> dict[str, Any]:
     properties = {
         "waypoint": waypoint.name,
-        "time_s": waypoint.time_s,
-        "stay_s": waypoint.stay_s,
-        "speed_mps": waypoint.speed_mps,
+        **entry(waypoint, "time_s", "stay_s", "speed_mps", "xtd_port_m", "xtd_starboard_m", "leg"),
         "xtd_m": route.xtd_m,
-        "xtd_port_m": waypoint.xtd_port_m,
-        "xtd_starboard_m": waypoint.xtd_starboard_m,
-        "leg": waypoint.leg,
         "runs_here": waypoint.held,
     }
     geometry = {"type": "Point", "coordinates": list(_position(waypoint))}

@@ -105,7 +105,9 @@ def _through(now: _Watch, data: Path, work: _Work, tell: Told, progress: Progres
     due = time.monotonic() + WRITTEN_EVERY_S
     size = data.stat().st_size if data != STREAM and data.is_file() else 0
     done, columns = 0, None
-    for piece in _rows_of(data, work.setup.steps, now.taken):
+    for piece in pieces(
+        data, inputs=work.setup.steps.names, stretch_s=math.ulp(0.0), most_rows=1, more_follow=True, taken=now.taken
+    ):
         columns = columns or _Columns(data, piece, work.setup.steps, column_limits(work.actuators))
         events_before = now.events
         for row in columns.rows(piece):
@@ -121,11 +123,6 @@ def _through(now: _Watch, data: Path, work: _Work, tell: Told, progress: Progres
             write_files(work.folder, _files(now, work))
             due = time.monotonic() + WRITTEN_EVERY_S
     return now
-
-
-def _rows_of(data: Path, steps: StepList, taken: Sequence[Taken]) -> Iterator[Piece]:
-    """Row by row."""
-    return pieces(data, inputs=steps.names, stretch_s=math.ulp(0.0), most_rows=1, more_follow=True, taken=taken)
 
 
 def _read(now: _Watch, piece: Piece, columns: _Columns) -> _Watch:

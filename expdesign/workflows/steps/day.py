@@ -14,7 +14,7 @@ from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, efficiencies
 from expdesign.errors import InputError, NoAnswer, NoPlan
 from expdesign.export.document import Document, Table, tabled
-from expdesign.export.files import dictionary_files, finite
+from expdesign.export.files import dictionary_files, entry, finite
 from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import Memory, memory_in_use, recalled, remembering
@@ -323,15 +323,7 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
         "cost_of_runs_bound_s": found.cost_bound_s,
         "curve": [{"day_s": day_s, "information": share} for day_s, share in found.curve.tolist()],
         "tried": [
-            {
-                "runs": dict(item.runs),
-                "day_s": item.day_s,
-                "expected_s": item.expected_s,
-                "informative_s": item.informative_s,
-                "information": item.information,
-                "told": dict(item.told),
-            }
-            for item in found.tried
+            entry(item, "runs", "day_s", "expected_s", "informative_s", "information", "told") for item in found.tried
         ],
     }
     return {"day.json": json.dumps(content, indent=2) + "\n", **_dictionary(case, day.added)}
