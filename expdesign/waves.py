@@ -114,8 +114,6 @@ class Waves:
 
 
 COMPONENTS, COURSES = 200, 36  # number of drawn wave components, and of courses over which encounter is averaged
-
-
 POWERS = {
     "length": 1.0, "time": 0.5, "speed": 0.5, "angle": 0.0, "mass": 3.0, "force": 3.0, "moment": 4.0, "damping": 4.5,
     "inertia": 5.0,

@@ -27,8 +27,6 @@ MOST_DELIVERIES = 5  # how often data are delivered with new dead times and lags
 SETTLED_CHANGE = 0.5  # change of such a time, in its standard deviations, below which it is not delivered again
 SURELY_EARLY = 3.0  # standard deviations by which a dead time is below zero from which it is told
 TIME_CHANGE = 0.1  # of a time, for derivatives, in samples
-
-
 Attempt = Callable[[Vessel, Record, tuple[ActuatorTime, ...]], Estimate]
 """(vessel, data, times that are estimated too) -> estimate."""
 

@@ -18,25 +18,9 @@ from expdesign.assessment.actuator_times import (
 from expdesign.assessment.held_out import HeldOut, ranked
 from expdesign.assessment.misfit import AHEAD_S, ESTIMATION, TEST, Limits, check_run, decomposed, one_step
 from expdesign.assessment.prior import PARAMETER_STD, apart_from_stated, check_prior, with_prior
-from expdesign.assessment.trials import (
-    Trial,
-    Work,
-    attempted,
-    horizons_of,
-    predictions_of,
-    prefixed,
-    starts_of,
-    tried,
-)
+from expdesign.assessment.trials import Trial, Work, attempted, horizons_of, predictions_of, prefixed, starts_of, tried
 from expdesign.assessment.unstated import answers, current
-from expdesign.assessment.values import (
-    CONTINUOUS,
-    HELD_OUT,
-    Assessed,
-    Assessment,
-    Disturbances,
-    EstimateOptions,
-)
+from expdesign.assessment.values import CONTINUOUS, HELD_OUT, Assessed, Assessment, Disturbances, EstimateOptions
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind, tells_current
 from expdesign.estimation.excitation import EQUATION_WISE, check_excitation, worst_case
@@ -53,8 +37,6 @@ from expdesign.vessel import Vessel
 MOST_BY_ITSELF = 20_000  # samples, averaged, up to which output error is tried without being asked for
 # how long one method takes, predictions of what is left out and the decomposition, for the progress told
 METHOD_WORK, PREDICTION_WORK, DECOMPOSITION_WORK = 0.9, 0.9, 0.1
-
-
 NO_TESTS = Record(batches=())
 
 

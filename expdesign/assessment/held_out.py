@@ -48,8 +48,6 @@ MOST_OF_DATA = 2 / 3  # share of the data from which on a run is not left out wh
 HELD_LENGTHS = 20.0  # for which inputs are held, in ship lengths sailed: two turning circles
 MOST_HELD = 5000  # samples of that
 RUNS_AWAY = 10.0  # times as fast as in the data that no hull gets
-
-
 UNBIASED = ("iv", "oe", "ls")  # solvers, those first that noise biases least
 
 

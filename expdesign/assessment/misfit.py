@@ -25,8 +25,6 @@ SLOW_S = 20.0  # periods longer than this [s], or than 40 samples, count as slow
 UNSTABLE_GROWTH = 5.0  # growth of an error over a run above which the ship is unstable
 # share of the squared misfit above which its parts have opposite signs, and their sizes no meaning
 CANCELLING_SHARE = 1.1
-
-
 ESTIMATION, TEST = "estimation", "test"
 
 

@@ -34,8 +34,6 @@ FEWEST_SAMPLES = 100  # for a diagnosis
 CONSTANT_RANGE = 1e-9  # range of a constant input, as a share of its size
 # response of the motion to the inputs' changes, in standard deviations of the noise, at least
 LEAST_RESPONSE = 0.5
-
-
 PER_SECOND_DIFFERENCE = np.sqrt(6.0)  # standard deviation of second differences of white noise of unit variance
 
 

@@ -8,13 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.accuracy import (
-    Accuracy,
-    accuracy,
-    check_excitation,
-    constant_inputs,
-    one_step_residuals,
-)
+from expdesign.diagnosis.accuracy import Accuracy, accuracy, check_excitation, constant_inputs, one_step_residuals
 from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
     error_reductions_of,

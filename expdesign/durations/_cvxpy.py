@@ -26,8 +26,6 @@ from expdesign.values import Array
 # added to the diagonal of a curvature, as a share of its trace, to make it positive definite
 CURVATURE_ROUNDING = 1e-14
 SOLVER_TOLERANCE = 1e-11  # gap and feasibility tolerance of the conic solver
-
-
 ALL = slice(None)
 
 

@@ -33,8 +33,6 @@ from expdesign.values import Array
 COINCIDE = 1e-9  # regressors coincide whose correlation, means included, falls short of 1 by less
 NEGLIGIBLE = 1e-12  # eigenvalues of scaled information below this are rounding
 SMALL_WEIGHT = 0.05  # least weight in a null vector of a parameter that a message names
-
-
 IDLE = "(unused time)"
 T = "T"  # name of the criterion that is about other parameters
 

@@ -129,8 +129,6 @@ def prediction_columns(picked: Picked) -> Array:
 
 NEARLY_SINGULAR = 1e-10  # below this, elimination loses digits that matter
 OUTSIDE_RANGE = 1e-6  # share of an estimated combination that may lie outside the range of a singular matrix
-
-
 Indices = NDArray[np.intp]
 
 

@@ -34,8 +34,6 @@ MOST_SETS = 60  # working sets
 BARRIER_FRACTION = 1e-7  # fractions below this are removed from the solution of the barrier method
 INDEFINITE = 1e-9  # eigenvalues below minus this are not rounding
 REGULAR_SET = 1e-8  # least eigenvalue of a first working set
-
-
 Indices = NDArray[np.intp]
 
 

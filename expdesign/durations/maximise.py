@@ -43,8 +43,6 @@ NEWTON_STEPS = 30  # most Newton steps; six to ten are usual, two or three from 
 # less, per degree
 MARGIN = 0.01
 CONIC_INEQUALITIES = 5  # most models and floors of such a problem; each costs as much again
-
-
 CVXPY, WORKING_SET, NEWTON = "cvxpy with CLARABEL", "working-set method", "Newton's method"
 NO_CHOICE = "none: least times take all of the time"  # names of the methods
 

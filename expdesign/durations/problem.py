@@ -27,8 +27,6 @@ from expdesign.values import Array, frozen_set, seal
 
 ROBUST = ("nominal", "average", "worst")
 """The nominal model only, the average over sampled models, or the worst of them."""
-
-
 UNUSED = 1e-9
 """Share in place of zero for strata that a run has no samples of, so that designs without them stay regular."""
 

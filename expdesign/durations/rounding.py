@@ -21,8 +21,6 @@ EQUAL_SHARE = 1e-9  # share of equal times added where the optimal design itself
 LEAST_GAIN_NEARLY_SINGULAR = 1e-6  # `least_gain` there
 NAMED_PAIRS = 3  # pairs of merged regressors that a note names
 INSERTIONS = 200  # primitives, best gain per second first, tried in an exchange of one run for several
-
-
 Indices = NDArray[np.intp]
 Totals = tuple[Array, ...]
 """(..., d, d) information collected, for each model."""

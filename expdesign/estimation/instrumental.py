@@ -30,8 +30,6 @@ MOST_CHOICES = 4  # of equation-wise samples, by the start and by what was estim
 MOST_CURRENTS = 8  # guesses of an unknown steady current after the first
 EXACT_SHARE = 1e-12  # of the data's power, which residuals have at least where equations are weighed by them
 PRIOR_SHARE = 1.0  # spread of a parameter without a stated standard deviation, relative to its size
-
-
 STARTS = ("nominal", "ls")  # models that first instruments may come from: the one in use, or that of least squares
 
 

@@ -25,14 +25,7 @@ from expdesign.estimation.regression import (
     model_for,
     with_wind_as_measured,
 )
-from expdesign.estimation.replay import (
-    LEAVE_OUT,
-    PLANNED,
-    Steered,
-    as_planned,
-    open_loop,
-    treatment_of,
-)
+from expdesign.estimation.replay import LEAVE_OUT, PLANNED, Steered, as_planned, open_loop, treatment_of
 from expdesign.estimation.solve import NullSpace, Refined, Solution
 from expdesign.estimation.values import Estimate, Feedback, Residuals, feedback_in, feedback_notes
 from expdesign.progress import Progress, silent
@@ -67,8 +60,6 @@ class Method:
 
 
 METHODS = tuple(method for solver in ESTIMATORS for weather in PREDICTORS if (method := Method(solver, weather)).exists)
-
-
 HOLDS_STEERED = {
     "ls": "least squares then holds only where it does without: velocities without noise, disturbances without memory.",
     "iv": "instruments simulated from their inputs are biased by disturbances that last.",

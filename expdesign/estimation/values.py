@@ -56,8 +56,6 @@ FEEDBACK_GAP_OF_DIFFERENCES = 3  # first later sample tested where velocities ar
 FEEDBACK_SAMPLES = 50_000  # compared by that test at most, which bounds its time and memory
 FEEDBACK_LEVEL = 0.01  # chance below which inputs are said to follow disturbances
 FEEDBACK_ROUNDING = 1e-6  # size of a direction of inputs, relative to theirs, below which it is rounding errors
-
-
 Mask = NDArray[np.bool_]
 
 

@@ -26,8 +26,6 @@ ORDER_TOLERANCE = 0.02
 MOST_ORDER_ROWS = 48  # rows of orders on one sheet
 CALLED_ORDER_S = 10.0  # mean time between orders below which they are too fast to be called out [s]
 FARTHEST_DANGER_M = 5000.0  # distance up to which the nearest danger is stated [m]
-
-
 HEADS = ("helm", "until the heading has changed by", "about, s")  # heads of the columns of `heading_rows`
 HELM_STEMS = ("rudder", "a")
 SIDES = ("starboard", "port")
@@ -155,8 +153,6 @@ def _figure(value: float) -> str:
 
 LONG, WIDE = 12, 5
 """Number of rows above which the orders use several columns, and cells per row up to which there are three."""
-
-
 TURN = 2 * math.pi
 
 
@@ -204,8 +200,6 @@ SIGNS = {
     "rudder": "rudder: 0 amidships; sign as in the vessel file.",
 }
 """Stem of a signal -> meaning of its sign."""
-
-
 DIRECTIONS = {"ahead": 0.0, "starboard": np.pi / 2, "port": -np.pi / 2}
 
 

@@ -49,8 +49,6 @@ from expdesign.export.card_orders import FARTHEST_DANGER_M
 
 RUNS_PER_SHEET = 3  # runs on one sheet
 NAMED_PARAMETERS = 4  # parameters named in the purpose of a run
-
-
 WIDTH_IN = 3.6
 
 
@@ -90,11 +88,7 @@ def _number(axes: Axes, starts: Array, track: Array, numbers: Sequence[int], *, 
 
 
 STEADY_HEADING_RAD = math.radians(3.0)
-
-
 STEADY_SPEED_SHARE, STEADY_SPEED_MPS = 0.1, 0.1
-
-
 BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File")  # blanks to be filled in at every run
 
 

@@ -30,8 +30,6 @@ CHANGED_INPUTS = 0.2  # change of inputs, summed in units of their standard devi
 # errors beyond so many standard deviations of the measurements are not drawn: the simulation has diverged
 MOST_SPREADS = 3.0
 COLOURED_BY_CHANCE = 0.01  # probability that any panel is coloured if nothing depends on anything
-
-
 DEGREES = float(np.degrees(1.0))
 SQUARED = "\N{SUPERSCRIPT TWO}"
 SPEEDS = {"u": ("u [m/s]", 1.0), "v": ("v [m/s]", 1.0), "r": ("r [\N{DEGREE SIGN}/s]", DEGREES)}

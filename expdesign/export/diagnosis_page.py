@@ -26,12 +26,7 @@ from expdesign.export.diagnosis_figures import (
     suspect_figure,
     window_figure,
 )
-from expdesign.export.diagnosis_results import (
-    CAUSE_HEADER,
-    accuracy_entry,
-    cause_rows,
-    finding_entry,
-)
+from expdesign.export.diagnosis_results import CAUSE_HEADER, accuracy_entry, cause_rows, finding_entry
 from expdesign.export.document import Block, Document, Figure, Gallery, Section, Table, filled, section
 from expdesign.export.roll_changes import RollVerdict, roll_sentences
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS
@@ -102,8 +97,6 @@ def estimate_words(name: str, cause: str) -> str:
 
 
 NO_NUMBER = "\N{EN DASH}"
-
-
 MEASURES = ("Fit", "RMS error", "Mean error")
 ABOUT_FITS = (
     "The fit is 100\N{NO-BREAK SPACE}% for a perfect simulation. It is 0\N{NO-BREAK SPACE}% for one that is as good as "

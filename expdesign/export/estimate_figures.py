@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 LINE_POINTS = 500  # points per line: more cannot be told apart at this size
 SHOWN_BEYOND = 0.6  # share of the measured range that is shown beyond it; simulations that leave it are cut off
-
-
 AXES = {
     "u": ("u [m/s]", 1.0),
     "v": ("v [m/s]", 1.0),

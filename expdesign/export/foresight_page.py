@@ -12,16 +12,7 @@ import numpy as np
 from expdesign.export import words
 from expdesign.export.document import Document, Figure, Table, filled, section
 from expdesign.export.files import entry, finite, strict_json
-from expdesign.export.pages.figures import (
-    BLUE,
-    GREY,
-    VERMILION,
-    light_grid,
-    new_figure,
-    page_figure,
-    plain,
-    svg,
-)
+from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, plain, svg
 from expdesign.foresight import TOLD_APART, AddedRuns, Detectability, Foreseen, Foresight, OperationForesight, interval
 
 NONE = "\N{EN DASH}"

@@ -54,8 +54,6 @@ GROUPS = (
 )
 """Trial -> (index, name) in the order of the form."""
 KIND_NAMES = {"azimuth": "azimuth thruster", "tunnel": "tunnel thruster"}
-
-
 NO_RESULT = "no\N{NO-BREAK SPACE}result"
 MARKS = {
     "met": verdict("\N{CHECK MARK}", True),

@@ -50,8 +50,6 @@ UNUSUAL = (
 )
 PLANING = "wave-making and planing are not in the regressions, state speeds at several orders."
 HUMP = 0.45
-
-
 ASSUMED = (
     "The card does not state these, so that they are the program's, not the ship's. State what is known: plans ask of "
     "her what limits and rates allow."

@@ -11,15 +11,7 @@ from markupsafe import Markup
 from expdesign import __version__
 from expdesign.errors import NoPlan
 from expdesign.export.document import Document, Figure, Items, section
-from expdesign.export.pages.figures import (
-    BLACK,
-    GREEN,
-    GREY,
-    PURPLE,
-    VERMILION,
-    page_figure,
-    svg,
-)
+from expdesign.export.pages.figures import BLACK, GREEN, GREY, PURPLE, VERMILION, page_figure, svg
 from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, sea_figure
 from expdesign.export.words import ship
 from expdesign.sea_area import SeaArea

@@ -18,8 +18,6 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel, column_name
 
 SIGNIFICANT = 0.01  # p-value below which asymmetry and hysteresis are reported as found
-
-
 STATES = ("speed", "yaw rate")
 STATE_UNITS = ("m/s", "rad/s")
 

@@ -272,8 +272,6 @@ def simulation_figure(part: Validated, halves: Sequence[int], key: str) -> str:
 
 
 MOST_SIMULATIONS = 4
-
-
 EQUATION = Markup(
     "m<sub>U</sub>(U, r) dU/dt + &sigma;<sub>U</sub>(U, r) = throttle, m<sub>r</sub>(U, r) dr/dt + "
     "&sigma;<sub>r</sub>(U, r) = rudder, each after its dead time. U is the speed {}, r the yaw rate."

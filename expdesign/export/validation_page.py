@@ -32,8 +32,6 @@ from expdesign.values import Array
 # largest relative difference of standard deviations that counts as agreement, apart from sampling error
 AGREEING_STD = 0.10
 BIASED = 0.5  # bias over standard deviation beyond which an estimator does not count as consistent
-
-
 CHANCE = 0.01  # probability that a bias, or a wrong standard deviation, is reported where there is none
 ERROR_LIMIT = 1.5  # normalised error below which the thesis calls a trial good
 

@@ -23,8 +23,6 @@ from expdesign.vessel import Vessel
 MOST_ADDED_S = 14400.0  # longest time of added runs [s]
 MOST_ADDED_RUNS = 200  # of one manoeuvre
 HEADINGS = 2  # of every manoeuvre that may be added
-
-
 ENDLESS = 1e5  # number of runs of every manoeuvre that stands for unlimited data
 
 

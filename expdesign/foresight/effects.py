@@ -173,8 +173,6 @@ FIT_POINTS = 5.0  # loss of simulated fit that matters, mean over the outputs [p
 SIZE_ROUNDS = 4  # of the search for the size of an effect that is not proportional to its number
 SIZE_REACH = 100.0  # sizes stay within this factor of the default
 BEYOND_STD = 3.0  # a parameter matters from so many of its stated standard deviations on
-
-
 OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoot_20_20_rad")
 """Of the standard trials, whose change matters."""
 WORDS = dict(zip(OUTCOMES, ("advance", "tactical diameter", "10/10 overshoot", "20/20 overshoot"), strict=True))

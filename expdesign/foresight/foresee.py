@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.model import group_columns, turns_by_force
-from expdesign.diagnosis.select import (
-    SELECTION_TUNING,
-)
+from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.dictionary import Primitive
 from expdesign.foresight.added import with_added_runs
 from expdesign.foresight.effects import (
@@ -27,12 +25,7 @@ from expdesign.foresight.effects import (
     sizes_that_matter,
     standard_trials,
 )
-from expdesign.foresight.information import (
-    JointInformation,
-    SimulatedUnits,
-    joint_information,
-    simulated_units,
-)
+from expdesign.foresight.information import JointInformation, SimulatedUnits, joint_information, simulated_units
 from expdesign.foresight.power import (
     Rivals,
     freedom_of,

@@ -25,8 +25,6 @@ from expdesign.values import Array
 
 DRAWS = 2000  # of score vectors, for the probability that one cause comes before another
 HELD_OUT_DRAWS = 60  # of trials, for the share in which held-out runs show what the test accepts
-
-
 SHAPES = ("roll:period", "roll:damping")  # fixed effects of a candidate that its fit estimates too
 TINY = 1e-300  # least squared error that has a logarithm
 

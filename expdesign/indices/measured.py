@@ -31,8 +31,6 @@ STEADY_APPROACH = 0.05  # change of speed, by the speed, over the last ship leng
 CURRENT = 0.02  # uniform current, by the approach speed, that is told when it is removed
 AT_REST = 0.02  # surge speed at the end of a record, by the approach speed, up to which the ship has stopped
 TOLD_CURRENT_MPS = 0.1  # current by which is told what one that nobody removed does to distances
-
-
 LEAST_HELM_RAD = math.radians(2.0)
 GONE_ON = 5.0  # ship lengths ahead after a stop, from which a record is of more than one trial
 TURNED_RAD = math.radians(80.0)

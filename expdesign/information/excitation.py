@@ -31,8 +31,6 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel
 from expdesign.vessel.structures import Expression, Signals
 
 LEAST_CLEAR = 0.5  # share of a run that meets the excitation condition, at least, where designs require it
-
-
 FREE, REWARDED, REQUIRED = "free", "rewarded", "required"
 EXCITATIONS = (FREE, REWARDED, REQUIRED)
 SIGMAS = 3.0

@@ -54,7 +54,6 @@ ALIKE = 3.0  # factor from one within which an answer is that of the model
 TURNED_RAD, TURNED_SHARE = 1.6, 0.95  # turn against a held input, and its share of all turns, that count as opposed
 PUSHING = 0.1  # share of an input's largest effect below which it is not held to any side
 
-
 GROUPS = (
     ("rudder", 2, ("rudder",), "the ship turns against the rudder", "positive to port"),
     ("azimuth", 2, ("a",), "the ship turns against her thrusters' angles", "positive to port"),
@@ -187,8 +186,6 @@ def _answers(batch: Batch, model: VesselModel, axis: int, places: Sequence[int],
 
 
 DRIFTS = 0.2  # that distance of ships, at least, from which the drift is expected
-
-
 SCALES = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if row.is_gain}
 """Findings that are undone -> columns of the velocity that are divided by them."""
 OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if not row.is_gain}

@@ -35,8 +35,6 @@ UNEVEN = 0.25  # spread of the gaps, as a share of the interval, up to which a s
 PHASES = 50  # changes whose phases are tried
 ONE_SIZE = 1.5  # multiple of the smallest change below which another is of the same size
 MOSTLY_ONE = 0.8  # share of changes of one size above which a signal is rounded
-
-
 Places = NDArray[np.int64]
 
 

@@ -41,8 +41,6 @@ TOLD_WAY = 0.002
 ON_COURSE = 0.5
 ON_TRACK = 0.5  # share of the expected drift below which heading and course are the same
 TURNING = 0.02  # drift expected in turns [rad], root mean square, from which heading and course can be told apart
-
-
 DEGREE = np.pi / 180.0
 
 

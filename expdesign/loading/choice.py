@@ -144,8 +144,6 @@ def _waves(ship: Vessel, sailed: Trajectory, frequency: Array) -> Array:
 
 # of a parameter's standard deviation, below which its value counts as zero; the deviation is then its size
 SMALL_SHARE = 0.01
-
-
 WEIGHED = ("m", "z_m")  # parameters of an unknown load
 
 
@@ -245,8 +243,6 @@ def _name(load: Load | None) -> str:
 
 
 LEAST_EFFICIENCY = 0.9  # D-efficiency that a plan with fewer loads keeps, of the best with all candidates
-
-
 BY_VOLUME = Aim()  # D: the volume of the confidence region of all parameters
 
 

@@ -67,7 +67,6 @@ LIMIT_SLACK = 0.02  # share of an actuator's limit by which a recorded input may
 MOST_BEYOND = 0.5  # share of rows beyond the limits above which a file is refused
 FAR_BEYOND = 3.0  # multiple of a limit from which another unit is thought of
 
-
 MISTAKES = {
     "n": (
         ("revolutions per minute belong under {rpm}", 1.0 / 60.0),
@@ -134,8 +133,6 @@ def _cause(signal: str, values: np.ndarray, limit: Limit, *, header: str, plain:
 
 HELD_SHARE = 0.5  # share of repeated positions of a moving ship above which they count as held values
 SIDEWAYS_RATIO = 2.0  # sway over surge (root mean square) above which the axes of the pose are questioned
-
-
 UNCHECKED = ("time_s", "batch", STEERED, "depth_m", "lat_deg", "lon_deg")
 
 
@@ -382,8 +379,6 @@ def _label_column(path: Path) -> tuple[str, ...]:
 
 
 NUMBER = "step"
-
-
 Levels = tuple[Array, Array | None, tuple[int | None, ...] | None]
 
 

@@ -31,8 +31,6 @@ CLOCKED_ROWS = 50  # from which the time between samples is learnt
 LINES = 4096  # looked at together
 WIND_COLUMNS = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad")
 OPTIONAL = (*WIND_COLUMNS, "depth_m", "steered", "batch", *AUXILIARY)
-
-
 CORRECTED_SHARE = 0.005  # share of the steps, at most, that corrections of a clock are
 
 

@@ -23,13 +23,7 @@ from numpy.typing import NDArray
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError
 from expdesign.estimation.regression import build_layout, build_regression, model_for
-from expdesign.estimation.replay import (
-    InstrumentModel,
-    Integration,
-    apart_from_start,
-    build_replay,
-    instrument_wind,
-)
+from expdesign.estimation.replay import InstrumentModel, Integration, apart_from_start, build_replay, instrument_wind
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array, seal, sealed
@@ -37,8 +31,6 @@ from expdesign.vessel import VesselModel
 
 SINGULAR = 1e-12  # least singular value of scaled equations, as a share of the largest, that still gives an estimate
 DEGENERATE_SHARE = 1.0  # simulation errors above this share of the motion make a model degenerate
-
-
 Subset = tuple[int, ...]
 """Numbers of the chosen pieces, ascending."""
 Simulate = Callable[[Array], Array]

@@ -10,18 +10,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from expdesign.requests.options import Argument, Request
-from expdesign.requests.planning import (
-    CheckRoute,
-    Durations,
-    Export,
-    New,
-    Nominal,
-    Plan,
-    RollPlan,
-    Run,
-    Score,
-    WhatIf,
-)
+from expdesign.requests.planning import CheckRoute, Durations, Export, New, Nominal, Plan, RollPlan, Run, Score, WhatIf
 from expdesign.requests.recorded import Diagnose, Estimate, IdentifySteps, Import, Indices, Mine, Monitor, WatchSteps
 from expdesign.requests.trials import Foresee, Incline, Replan, Roll, Simulate, TrialResult, Validate
 

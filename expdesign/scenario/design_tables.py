@@ -97,8 +97,6 @@ class BudgetTable(Table):
 
 
 LONGEST_TOTAL_S = 1e6
-
-
 MOST_STARTS = 100
 
 

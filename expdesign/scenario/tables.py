@@ -187,7 +187,6 @@ KIND_WORDS = {
     "model_type": "a table",
 }
 
-
 UNION_PARTS = ("int", "constrained-str")  # steps of a place that name an alternative type, no key
 
 

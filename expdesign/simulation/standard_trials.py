@@ -174,8 +174,6 @@ class _Sample:
 
 SIDES = {"starboard": 1, "port": -1}
 MANY = 10_000  # orders of a zig-zag that is limited by its time alone
-
-
 AT_SERVICE_SPEED = Conduct()
 
 

@@ -47,7 +47,6 @@ SIGNALS = {
 }
 """Signal stem -> word for it, its unit and the unit of its rate, as in keys of vessel files."""
 
-
 RATE_UNITS = {name: unit.strip("_") for name, (_, _, unit) in SIGNALS.items()}  # signal stem -> unit of its slew rate
 
 

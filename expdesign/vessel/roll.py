@@ -144,8 +144,6 @@ NOT_FOLLOWED = (
     "the vessel's model has a roll mode, [model.roll], which this calculation does not support; expected a vessel "
     "file without it"
 )
-
-
 ROLL_PARAMETERS = ("k", "A_x", "d", "K_r", "K_vd", "K_delta", "z_f")
 """Names of a pendulum's parameters; see `roll.MEANINGS` and `roll.UNITS`."""
 NOT_ACTING_BACK = (

@@ -107,8 +107,6 @@ ACTUATOR_SLEW = Cause(
     candidates=_slewing,
     explain=_explain_slew,
 )
-
-
 QUANTILES = (0.1, 0.2, 0.35, 0.5)
 SHARE, COUNT = 0.75, 40
 

@@ -39,7 +39,6 @@ CURRENT = Cause(
     unseen="no heading is measured",
 )
 
-
 LEAST_VARIATION = 0.01
 
 
@@ -70,7 +69,6 @@ SHALLOW_WATER = Cause(
     explain=_explain_shallow_water,
     unseen="no depth is recorded",
 )
-
 
 ASSUMED_MPS, SECTORS, FINER = 10.0, 8, 7
 """For a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""

@@ -62,8 +62,6 @@ CHANGE_POINT = Cause(
     candidates=_candidates_change_point,
     explain=_explain_change_point,
 )
-
-
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 
 
@@ -151,8 +149,6 @@ PARAMETERS = Cause(
     candidates=_candidates_parameters,
     explain=_explain_parameters,
 )
-
-
 ROLL_MODES = 14
 DAMPING = 0.08
 INSIDE = 1.01

@@ -96,8 +96,6 @@ def _of_row(row: Quantity, fault: Fault) -> Cause:
 
 
 OF_ROWS = tuple(_of_row(row, row.fault) for row in GAINS_AND_OFFSETS if row.fault is not None)
-
-
 NAMES = {
     "u": "the speed ahead",
     "v": "the speed to starboard",
@@ -139,6 +137,4 @@ SENSOR_DELAY = Cause(
     candidates=_candidates_sensor_delay,
     explain=_explain_sensor_delay,
 )
-
-
 SENSOR_CAUSES = (HEADING_BIAS, LEVER_ARM, SENSOR_DELAY, *OF_ROWS)  # faults of the record rather than of the model

@@ -20,13 +20,7 @@ from expdesign.diagnosis.fit import (
     prediction_gain,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.select import (
-    SELECTION_TUNING,
-    Selection,
-    Step,
-    p_value_between_runs,
-    same_effects_as_any,
-)
+from expdesign.diagnosis.select import SELECTION_TUNING, Selection, Step, p_value_between_runs, same_effects_as_any
 from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding
 from expdesign.diagnosis.vessel_file import public_name, stated_values
 from expdesign.signals import Record

@@ -36,7 +36,6 @@ MANOEUVRES = {
 }
 """Standard proposals in words; those of a scenario's dictionary keep their names."""
 
-
 LITTLE_FIT = 50.0  # fit [%] of an output below which data are not called free of error, whatever noise there is
 MOST_SIZES = 2  # numbers of a cause in a sentence; the table has all
 MOST_NAMED = 3  # parameters, or equivalent causes, in a sentence

@@ -17,8 +17,6 @@ LAGS = (1, 2)  # of differences of white noise that are tried [samples]; one for
 # of the remainder's variance that is always taken as white. No model is right at every frequency, and smoothed data
 # would otherwise give the fastest motions, of which they show nothing, the most weight
 WHITE_SHARE = 0.05
-
-
 NO_DIFFERENCE = 0.0, 1
 
 

@@ -33,8 +33,6 @@ LEAST_CORRELATION_EIGENVALUE = 1e-6  # of stated parameters; smaller ones count 
 FORCE_SPACING_S = 60.0  # between the knots of a force that nobody measured [s]
 # sizes of such a force that are tried, as ridge penalties
 FORCE_PENALTIES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
-
-
 POSITIVE = tuple(f"{kind}:" for kind in FOLLOWING)  # effects that are times, from zero on
 LEAST_PIVOT = 1e-6  # of a matrix with a unit diagonal that counts as regular: the size of a direction beside all others
 LITTLE = 1e-6  # share of a step from which slopes of factors are taken

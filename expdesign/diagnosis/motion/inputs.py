@@ -10,13 +10,7 @@ import numpy as np
 import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
-from expdesign.diagnosis.model import (
-    RESPONSES,
-    ExtendedModel,
-    group_columns,
-    mean_wind,
-    response_effect,
-)
+from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind, response_effect
 from expdesign.simulation import deliver, keeps_to, positions
 from expdesign.simulation.motion import to_body
 from expdesign.simulation.program import evaluation

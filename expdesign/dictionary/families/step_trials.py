@@ -191,7 +191,6 @@ STAIRCASE_SETTINGS = (
     ),
 )
 
-
 Level = tuple[Approach, float]
 """Of a staircase: the straight run at its engine order, and its helm [rad] from that, positive to starboard."""
 

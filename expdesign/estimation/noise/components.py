@@ -20,8 +20,6 @@ LEAST_LEFT = 0.05  # share of a part of the noise that parameters leave in resid
 MEMORY_DOUBLINGS = 1.0  # how far the memory of a slow part may be from the found one, standard deviation of log2
 ROUNDING = 1e-9  # expected periodogram of a part with unit variance below which it is rounding errors
 LONG_GAP_SAMPLES = 500  # missing samples in a row after which the noise starts again
-
-
 Turn = NDArray[np.complex128]
 """exp(i psi) of headings psi."""
 Numbers = TypeVar("Numbers", NDArray[np.float64], Turn)

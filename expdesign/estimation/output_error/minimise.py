@@ -67,8 +67,6 @@ SETTLED_COST = 1e-4  # expected decrease of the cost, in squared standard deviat
 ROUGH_SAMPLES = 10_000  # compared at earlier horizons than the last, spread over the data
 ROUGH_STEP_S = 0.5  # longest step of simulations that compare some samples only
 ROUGH_COST = 0.1  # the same for earlier horizons
-
-
 ACTIVITY = "fitting simulations to the data"
 
 

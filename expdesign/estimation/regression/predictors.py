@@ -105,7 +105,6 @@ PREDICTORS = (
     ),
 )
 
-
 Within = Sequence[tuple[float, Table]]
 """Share of each part of a sample, and the signals of its inputs."""
 HELD: Within = ((1.0, {}),)

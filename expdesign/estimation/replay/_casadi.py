@@ -22,8 +22,6 @@ from expdesign.values import Array
 from expdesign.vessel import Operators, VesselModel
 
 BLOCK_INSTRUCTIONS = 20_000  # size of the flat CasADi functions that simulations are cut into
-
-
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 
 

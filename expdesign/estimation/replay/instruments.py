@@ -47,8 +47,6 @@ from expdesign.values import Array, frozen_set
 from expdesign.vessel import NUMPY, column_name
 
 SHORTEST_STRETCH = 3  # samples between steered ones that are worth a batch
-
-
 HEADINGS = ("measured", "simulated")
 WINDS = ("lagged", "mean", "measured")
 

@@ -21,8 +21,6 @@ from expdesign.vessel import VesselModel
 
 BLOCK_SAMPLES = 256  # of a stretch, simulated at once
 SIMULATED_POINTS, BLOCK_POINTS = 1024, 4096  # samples of all stretches, simulated or differentiated at once
-
-
 INTEGRATORS = {"euler": euler_step, "rk4": rk4_step}
 Called = Callable[..., tuple[Array, ...]]
 """A compiled function of arrays."""

@@ -9,14 +9,7 @@ from __future__ import annotations
 from lxml import etree
 
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
-from expdesign.export.formats.format import (
-    Format,
-    corridor_sentence,
-    degrees,
-    leg_sentence,
-    route_file,
-    xml_text,
-)
+from expdesign.export.formats.format import Format, corridor_sentence, degrees, leg_sentence, route_file, xml_text
 from expdesign.export.routes import ROUTE_NAME, Route, Waypoint
 
 GPX = "http://www.topografix.com/GPX/1/1"

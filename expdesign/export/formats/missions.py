@@ -102,8 +102,6 @@ def _polygons(route: Route) -> list[dict[str, Any]]:
 PLAN = Format(
     name="qgc", file_name=route_file("plan"), summary="QGroundControl plan with speeds and fence", write=write_plan
 )
-
-
 HEADER = "QGC WPL 110"
 
 

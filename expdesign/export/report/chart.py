@@ -46,8 +46,6 @@ LETTER_IN = 0.075  # mean width of the letters of a zone's name
 UNCHARTED_SHARE = 1e-6  # share of the allowed water that may be outside the charted depths that bound it
 FOOTPRINT_SEED = 0  # random seed of the footprint figure; the planner uses other random numbers
 FOOTPRINT_PIECES = 40  # places of the hull along a run that its drawn footprint is made of
-
-
 STEPS = (1.0, 2.0, 5.0, 10.0)
 
 

@@ -281,8 +281,6 @@ def _number_runs(axes: Axes, plan: Plan) -> None:
 
 LEAST_SPAN = {"u [m/s]": 0.2, "v [m/s]": 0.2, "r [\N{DEGREE SIGN}/s]": 0.2}
 """Axes show at least this much, so that rounding errors do not look like motion."""
-
-
 SIZE_IN = (5.2, 3.3)
 PATH_BOX = (0.125, 0.15, 0.335, 0.82)  # place of the path's axes: left, bottom, width, height, as shares of the figure
 CURVE_BOXES = tuple((0.655, bottom, 0.33, 0.235) for bottom in (0.735, 0.4425, 0.15))

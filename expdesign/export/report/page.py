@@ -29,8 +29,6 @@ SUBTRACTION = {
     "complete": "the mean over all data is subtracted from the instruments; this removes the effect of constant "
     "disturbances",
 }
-
-
 MORE_THAN_OPTIMAL = " It is more than 100 % because the legs between the runs inform, too."
 
 

@@ -187,19 +187,11 @@ def require_verified(plan: Plan) -> None:
 
 
 TRACK_COLUMNS = ("time_s", *POSE_COLUMNS, *VELOCITY_COLUMNS, "leg", "lat_deg", "lon_deg")
-
-
 EXPECTED = "a plan.json as expdesign plan and expdesign run write it"
-
-
 STATE_TOLERANCE = 1e-5
 """Largest difference between plan.json, which has every digit, and track.csv, which has micrometres [m, rad, m/s,
 rad/s]."""
-
-
 DEGREE_TOLERANCE = 1e-7
-
-
 TIME_TOLERANCE_S = 1e-6
 
 

@@ -25,8 +25,6 @@ from expdesign.values import Array
 
 FENCE_MARGIN = 0.1  # room around the track, as a share of its extent, that the fence may cover
 FENCE_HALVINGS = 12  # of the slack by which the fence is simplified, until it keeps to the water
-
-
 DECIMALS = 7
 
 

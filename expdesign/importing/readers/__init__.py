@@ -88,7 +88,6 @@ NO_LOGS = {
 }
 """How files begin that are no logs -> what they are, and what would be right."""
 
-
 LONGEST_LINE = 1 << 24  # bytes
 
 

@@ -22,8 +22,6 @@ JITTER_SHARE = 0.25  # largest deviation of an interval from the sample time, as
 SAMPLE_TIME_MISMATCH = 0.01  # largest relative difference of two sample times that count as equal
 LONGEST_SAMPLE_TIME_S = 20.0  # limit of IMO MSC/Circ.1053 for manoeuvring trials [s]
 SHORTEST_SAMPLE_TIME_S = 1e-4  # limit below which the unit of time is questioned [s]
-
-
 UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"), (1 / 60, "minutes"), (1 / 3600, "hours"))
 
 
@@ -197,7 +195,6 @@ RANGES = (
     Range(pattern="lat_deg", low=-90, high=90, expected="-90 to 90 degrees"),
     Range(pattern="lon_deg", low=-180, high=180, expected="-180 to 180 degrees"),
 )
-
 
 ROUND = re.compile(r"(?:planned_|reached_)?a\d+_rad|wind_angle_rad")
 """Angles that go round and round: any number of turns stands for the same direction, as it does for the heading."""

@@ -20,8 +20,6 @@ LARGEST_NUMBER = 1e15  # limit above which a number is an error
 LISTED_ROWS = 3  # stretches of rows that a message lists
 WIND_DISAGREEMENT = 0.3  # relative difference between vane and components that gets a note
 WIND_EXPLAINED = 0.1  # remaining relative difference at which a wrong direction convention is the explanation
-
-
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
 OPTIONAL = (
     ("wind_u_mps", "wind_v_mps"), ("wind_speed_mps", "wind_angle_rad"), ("depth_m",), ("steered",),

@@ -16,10 +16,4 @@ from expdesign.records.pose.motion import (
     smoothed_velocity,
     velocity_origins,
 )
-from expdesign.records.pose.position import (
-    Fix,
-    check_jumps,
-    last_fix,
-    with_continuous_angles,
-    with_metres,
-)
+from expdesign.records.pose.position import Fix, check_jumps, last_fix, with_continuous_angles, with_metres

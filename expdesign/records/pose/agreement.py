@@ -29,8 +29,6 @@ TURNING_RAD = 0.05  # change of heading over a window (root mean square) below w
 # change of the pose over a window (root mean square) that noise alone may make: of heading [rad] and of place [m]
 NOISE_RAD, NOISE_M = 0.2, 5.0
 BY_CHANCE = 1e-3  # probability from which noise may look like a mistake
-
-
 FASTEST_MPS = 60.0  # speed over ground that positions may show
 DEGREE = np.pi / 180.0
 

@@ -16,8 +16,6 @@ from expdesign.values import Array, sealed
 from expdesign.vessel import Limit
 
 JUMP_RATIO = 10.0  # a step above this multiple of the 95th percentile of all changes gets a note
-
-
 TURN = 2.0 * np.pi
 TIE = 1e-9
 """Share of a turn within which a step counts as half a turn, so that it goes the same way however it is written."""

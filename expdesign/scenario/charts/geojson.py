@@ -27,8 +27,6 @@ from expdesign.scenario.tables import Entry, shown
 from expdesign.values import Array
 
 AREA_ROUNDING_DEG2 = 1e-13  # area of rounding, for outlines of about one degree; a tenth of a square decimetre
-
-
 UNNAMED = ""  # layer of features that name none
 POLYGON_TYPES = ("Polygon", "MultiPolygon", "GeometryCollection")
 GEOMETRY_TYPES = (*POLYGON_TYPES, "Point", "MultiPoint", "LineString", "MultiLineString")

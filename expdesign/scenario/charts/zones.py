@@ -126,8 +126,6 @@ class AreaTable(Table):
 
 
 LARGEST_EXTENT_KM = 250.0  # of a sea area, so that a local frame holds it
-
-
 STEP_DEG = 0.005
 """Chart edges are straight in latitude and longitude; cut into pieces this long they are straight in the frame too,
 to a centimetre."""
@@ -208,8 +206,6 @@ def rule_text(depth: DepthTable, draught_m: float) -> tuple[float, str]:
 
 
 WALL_HALF_WIDTH_M = 1.0  # half the width given to walls and pontoons drawn as lines
-
-
 SOLID = (
     *("LNDARE", "SLCONS", "PONTON", "HULKES", "FLODOC", "DRYDOC", "GATCON", "DAMCON", "DYKCON", "CAUSWY", "LOGPON"),
     *("MORFAC", "PILPNT", "OFSPLF", "PYLONS", "BCNCAR", "BCNISD", "BCNLAT", "BCNSAW", "BCNSPP", "MARCUL", "FSHFAC"),

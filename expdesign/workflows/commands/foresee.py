@@ -7,12 +7,7 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import FileError, InputError
-from expdesign.export.foresight_page import (
-    foresight_document,
-    foresight_json,
-    operation_document,
-    operation_json,
-)
+from expdesign.export.foresight_page import foresight_document, foresight_json, operation_document, operation_json
 from expdesign.export.routes import read_plan
 from expdesign.foresight import TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial

@@ -16,15 +16,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
 from expdesign.requests import repeating
 from expdesign.signals import Record, fit_percent
-from expdesign.step_trials import (
-    Sailed,
-    StepTrial,
-    ahead_only,
-    controls_of,
-    nominal_vessel,
-    sailed,
-    with_delays,
-)
+from expdesign.step_trials import Sailed, StepTrial, ahead_only, controls_of, nominal_vessel, sailed, with_delays
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
 from expdesign.workflows.outcome import Outcome, finished, workflow

@@ -33,15 +33,7 @@ from expdesign.records.load import check_limits, column_limits
 from expdesign.requests import repeating
 from expdesign.saved import restored, saved
 from expdesign.step_trials import controls_of
-from expdesign.step_trials.live import (
-    Row,
-    Setup,
-    State,
-    StepList,
-    after_row,
-    beginning,
-    expected_constants,
-)
+from expdesign.step_trials.live import Row, Setup, State, StepList, after_row, beginning, expected_constants
 from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.workflows.outcome import Outcome, Told, finished, left_state, silently, workflow
 from expdesign.workflows.steps.measured import equipped

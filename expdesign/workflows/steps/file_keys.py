@@ -170,8 +170,6 @@ REFUSED = (
     "Results of an earlier attempt in the same folder stay; the draft names them. A plan that is found takes "
     "the draft away, or a note says why it stays."
 )
-
-
 KEYS_ALONE: dict[str, tuple[str, str, type[Table]]] = {
     "scenario": ("Scenario files", f"{VARIANTS} {REFUSED}", ScenarioFile),
     "card": ("Pilot cards", CARDS, CardFile),

@@ -20,8 +20,6 @@ from expdesign.vessel import Vessel
 
 STEP_FAMILIES = ("throttle_steps", "rudder_steps")
 USUAL_INTERVAL_S = 1.0  # time between rows of a list that has one row [s]
-
-
 Listing = tuple[Array, Sequence[int | None] | None, float]
 """Levels of the commands, numbers of the steps to them, and the time of the first [s]."""
 
