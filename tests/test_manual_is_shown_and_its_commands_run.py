@@ -38,10 +38,18 @@ def test_a_page_is_shown_whole(name: str, capsys: pytest.CaptureFixture[str]) ->
     assert f"# {page(name).title}\n\n{shown.partition(chr(10))[2].strip()}\n" == (PAGES / f"{name}.md").read_text()
 
 
+def lines(name: str) -> str:
+    """Lines of TOML that a page has the reader write."""
+    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    return "\n".join(re.findall(r"^ {7}((?:\[|\w+ = ).*)$", text, re.MULTILINE))
+
+
 def carried_out(commands: list[list[str]], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "scenarios").symlink_to(ROOT / "scenarios")
+    """In a folder without the project's examples, as an installed package has none."""
     monkeypatch.chdir(folder)
     for command in commands:
+        if "truth.toml" in command:
+            (folder / "truth.toml").write_text((folder / "mytrial/vessel.toml").read_text() + lines("first-estimate"))
         assert main(command) == 0, command
         named = [folder / word for word in command if word.startswith("runs/")]
         assert all(path.exists() for path in named)
@@ -59,15 +67,27 @@ def test_a_card_becomes_a_vessel_as_its_page_says(tmp_path: Path, monkeypatch: p
     commands = tutorial("pilot-card")
     commands = [command for command in commands if command[0] not in LONG]
     assert [command[0] for command in commands] == ["explain", "nominal", "nominal", "indices", "new", "durations"]
-    lines = re.findall(r"^ {7}((?:\[|\w+ = ).*)$", (PAGES / "pilot-card.md").read_text(encoding="utf-8"), re.MULTILINE)
-    (tmp_path / "card.toml").write_text("\n".join(lines))
+    (tmp_path / "card.toml").write_text(lines("pilot-card"))
     assert len(load_card(tmp_path / "card.toml").stated) == 2
     carried_out(commands, tmp_path, monkeypatch)
 
 
 @pytest.mark.thorough
 def test_a_log_is_imported_and_estimated_as_the_tutorial_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "bridge.csv").symlink_to(ROOT / "scenarios/logs/bridge.csv")
+    (tmp_path / "ship.toml").symlink_to(ROOT / "scenarios/vessels/logged-50m.toml")
     carried_out(tutorial("your-log"), tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("name", MANUAL)
+def test_commands_need_no_files_of_the_project(name: str) -> None:
+    words = [word for command in tutorial(name) for word in command]
+    assert not [word for word in words if word.startswith("scenarios/")]
+
+
+def test_examples_of_commands_need_no_files_of_the_project() -> None:
+    named = [path for path in (ROOT / "expdesign/requests").glob("*.py") if "scenarios/" in path.read_text("utf-8")]
+    assert not named
 
 
 @pytest.mark.slow

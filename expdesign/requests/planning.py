@@ -79,7 +79,7 @@ class Nominal(Request):
     Writes vessel.toml, with standard deviations and correlations; nominal.json and nominal.html: her trials predicted
     with 95 % intervals beside what the card states, the source of every number, and what on the card contradicts.
 
-    Example: expdesign nominal scenarios/cards/offshore-45m.toml
+    Example: expdesign nominal card.toml
     """
 
     card: Annotated[
@@ -197,7 +197,7 @@ class WhatIf(Request):
 
     Writes whatif.json and whatif.html.
 
-    Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
+    Example: expdesign whatif mytrial/scenario.toml mytrial/half-an-hour.toml
     """
 
     scenario: ScenarioFile
@@ -222,7 +222,7 @@ class RollPlan(Request):
     roll-plan.json, loads.toml for expdesign roll, and durations-N.json of each load case for expdesign plan. Ends with
     status 3 where no candidate tells a combination of the parameters, and names it.
 
-    Example: expdesign roll-plan scenarios/roll-trial.toml --loads scenarios/loads/roll-trial.toml
+    Example: expdesign roll-plan mytrial/scenario.toml --loads loads.toml
     """
 
     scenario: ScenarioFile

@@ -33,8 +33,8 @@ class Foresee(Request):
     --operation: operation.json and operation.html, which changes a watch finds, after how long, and how it names them.
     The causes: expdesign explain causes
 
-    Example: expdesign foresee scenarios/helsinki.toml
-    Example: expdesign foresee scenarios/story.toml --operation 10 --jobs 0
+    Example: expdesign foresee mytrial/scenario.toml
+    Example: expdesign foresee mytrial/scenario.toml --operation 10 --jobs 0
     """
 
     scenario: ScenarioFile
@@ -140,7 +140,7 @@ class Replan(Request):
     vessel-used.toml, the model it is planned with. The rest begins with the motion and the commands of the last rows
     of the data, or with the ship stopped there.
 
-    Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
+    Example: expdesign replan mytrial/scenario.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
     """
 
     scenario: ScenarioFile
@@ -228,7 +228,7 @@ class Incline(Request):
 
     Writes incline.json, with a row for every weight and shift.
 
-    Example: expdesign incline --vessel scenarios/vessels/roll-model.toml --mass-kg 0.2 0.4 --shift-m 0.05 0.1
+    Example: expdesign incline --vessel ship.toml --mass-kg 0.2 0.4 --shift-m 0.05 0.1
     """
 
     vessel: Annotated[Path, Option(metavar="VESSEL.toml", help="Ship with [roll].")]
