@@ -26,8 +26,10 @@ from expdesign.diagnosis.select.selection import (
     Selection,
     Step,
     insignificant_steps,
+    p_value_between_runs,
     wald_p_value,
     with_alternatives_beside_all,
+    with_p_values_beside_all,
     without_step,
 )
 from expdesign.diagnosis.select.selection_round import (
@@ -170,6 +172,16 @@ def barge():
     return extended, cut_windows(extended.model, record)
 
 
+@pytest.fixture(scope="module")
+def barge_of_two():
+    """The fit before any cause of a barge with a weak thrust and a turned compass, and the data."""
+    faults = {"heading_bias": 0.04}
+    record = hidden_record("barge", seed=43, batches=4, samples=150, effects={"gain": -0.03}, faults=faults)
+    extended = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(extended.model, record)
+    return fit(extended, windows, (), starts=initial_states(windows)), windows
+
+
 def with_p_values(steps: list[Step], last: Fit) -> tuple[Step, ...]:
     """Steps with the p-values of their sizes in the last fit."""
     return tuple(replace(step, p_value=wald_p_value(step.chosen, last)) for step in steps)
@@ -221,6 +233,35 @@ def test_an_alternative_has_to_explain_as_much_beside_all_other_causes():
     assert left.trails_by < 1.0
     assert left.ship.get("term:Y_abs_v_v") == pytest.approx(found.last.value("term:Y_abs_v_v"), rel=0.01)
     assert last.alternatives == rivals[:1]  # nothing was found after it
+
+
+def test_the_p_value_of_a_cause_is_that_of_taking_it_away_beside_all_others(barge_of_two):
+    """Whatever the order in which causes were added: on none before it, the first gained under larger noise."""
+    before, windows = barge_of_two
+    alone, told = dict[str, float](), list[dict[str, float]]()
+    for order in (("gain", "heading_bias"), ("heading_bias", "gain")):
+        steps, base = [], before
+        for name in order:
+            steps.append(added(base, windows, Candidate(cause=name, free={name: 0.0})))
+            base = steps[-1].chosen.fit
+        found = Selection(steps=tuple(steps), first=before, last=base, last_tests=())
+        judged = with_p_values_beside_all(found)
+        alone[order[0]] = steps[0].chosen.likelihood_gain
+        told.append({step.chosen.candidate.cause: step.chosen.likelihood_gain for step in judged.steps})
+        assert all(step.p_value < 1e-100 for step in judged.steps)
+    for name, gain in alone.items():
+        first, second = (one[name] for one in told)
+        assert first == pytest.approx(second, rel=0.4)  # noise is estimated anew
+        assert min(first, second) > 2.0 * gain
+    assert p_value_between_runs(steps[0].chosen, None, found.dispersion) > 1e-40
+
+
+def test_a_single_cause_keeps_its_p_value(barge_of_two):
+    before, windows = barge_of_two
+    only = added(before, windows, Candidate(cause="gain", free={"gain": 0.0}))
+    found = Selection(steps=(only,), first=before, last=only.chosen.fit, last_tests=())
+    (step,) = with_p_values_beside_all(found).steps
+    assert step.chosen.likelihood_gain == only.chosen.likelihood_gain
 
 
 def test_runs_held_out_do_not_influence_the_estimates_they_validate(barge):

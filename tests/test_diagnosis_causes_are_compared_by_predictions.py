@@ -275,6 +275,34 @@ def test_what_no_search_found_is_not_named_where_much_is_explained(monkeypatch):
     assert not diagnose(vessel, trial(2, faults={"heading_bias": BIAS_RAD})).findings
 
 
+class Asked(Exception):
+    """Causes that may be found by predictions."""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("dropped", "asked"), [("heading_bias", {"heading_bias"}), ("parameters", set())])
+def test_any_cause_may_be_found_where_the_search_found_parameters_that_are_no_finding(monkeypatch, dropped, asked):
+    """Other values of many parameters imitate any cause, so that the search has told nothing of the others."""
+
+    def found_so(*given: object) -> Selection:
+        found = search(*given)
+        (step,) = found.steps
+        named = replace(step.chosen.candidate, cause=dropped)
+        return replace(found, steps=(replace(step, chosen=replace(step.chosen, candidate=named)),))
+
+    def compared_with(*given: object) -> None:
+        raise Asked(given[-1])
+
+    search = selecting.select_forward
+    monkeypatch.setattr(selecting, "select_forward", found_so)
+    monkeypatch.setattr(selecting, "explains_little", lambda *_: False)
+    monkeypatch.setattr(selecting, "eliminate_backward", lambda found, _w, check, *_: check(found.with_steps(())))
+    monkeypatch.setattr(selecting, "compare_predictions", compared_with)
+    with pytest.raises(Asked) as told:
+        diagnose(vessel_of("coaster", relative_std=0.1), trial(2, faults={"heading_bias": BIAS_RAD}))
+    assert told.value.args == (asked,)
+
+
 @pytest.mark.thorough
 def test_a_simulation_that_explains_much_is_left_to_the_search(monkeypatch):
     monkeypatch.setattr(selecting, "compare_predictions", lambda *_: pytest.fail("causes were compared"))

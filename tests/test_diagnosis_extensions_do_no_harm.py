@@ -59,8 +59,7 @@ def test_causes_that_re_estimated_parameters_spoil_are_fitted_beside_the_file(
     known = replace(found, last=last, beside_stated=True)  # type: ignore[arg-type]
     monkeypatch.setattr(judgement, "fitted_ahead", lambda *_, beside_stated: known if beside_stated else None)
     monkeypatch.setattr(judgement, "harms", lambda _ship, after, _record: getattr(after, "name", after) in harmful)
-    monkeypatch.setattr(judgement, "with_runs_counted", lambda selection, *_: selection)
-    monkeypatch.setattr(judgement, "open_candidates", lambda *_: [])
+    monkeypatch.setattr(judgement, "as_told", lambda selection, *_: selection)
 
     def of(fit_percent):
         return replace(errors(fit_percent), ahead=lambda: replace(errors(fit_percent), in_stretches=True))
@@ -95,8 +94,7 @@ def test_nothing_is_written_that_predicts_no_better_than_the_file(monkeypatch, a
     monkeypatch.setattr(judgement, "fitted_ahead", lambda *_, **__: known)
     monkeypatch.setattr(judgement, "harms", lambda *_: False)
     monkeypatch.setattr(judgement, "only_nuisance", lambda *_: False)
-    monkeypatch.setattr(judgement, "with_runs_counted", lambda selection, *_: selection)
-    monkeypatch.setattr(judgement, "open_candidates", lambda *_: [])
+    monkeypatch.setattr(judgement, "as_told", lambda selection, *_: selection)
     monkeypatch.setattr(judgement, "improves_held_out", lambda _found, held, *_: [held[1].mean_fit > held[0].mean_fit])
     fits = {"alone": alone, "re-estimated": written, "beside": beside}
 

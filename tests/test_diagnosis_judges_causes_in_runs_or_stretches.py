@@ -160,7 +160,7 @@ def test_parameters_far_beyond_the_file_are_the_other_answer_where_they_alone_ga
     found = replace(steps_of("wind"), steps=(step,), first=first)  # type: ignore[arg-type]
     monkeypatch.setattr(stated_parameters, "within_stated_std", lambda _fit: False)
     monkeypatch.setattr(stated_parameters, "only_nuisance", lambda *_: False)
-    monkeypatch.setattr(stated_parameters, "prediction_gain", lambda *_: (np.nan, (np.nan, np.nan)))
+    monkeypatch.setattr(stated_parameters, "certain_in_predictions", lambda *_: 0.0)
     parameters = Candidate(cause="parameters", free={"theta:Y_v": 0.0})
     monkeypatch.setattr(stated_parameters, "open_candidates", lambda *_: [parameters])
     validation = SimpleNamespace(of=lambda _: errors(alone))

@@ -233,9 +233,13 @@ def test_held_out_parts_tell_of_two_runs_what_one_degree_of_freedom_cannot(monke
     step = Step(chosen=chosen, p_value=0.11, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
     found = Selection(steps=(step,), first=None, last=None, last_tests=())  # type: ignore[arg-type]
     monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_: (share, (0.1, 0.9)))
-    monkeypatch.setattr(backward_elimination, "prediction_p_value", lambda *_: 1e-4)
-    windows = SimpleNamespace(batch=np.repeat(np.arange(float(runs)), 4))
-    (after,) = backward_elimination.two_runs_by_predictions(found, (None, None), windows).steps  # type: ignore[arg-type]
+    windows, whole, apart = SimpleNamespace(batch=np.repeat(np.arange(float(runs)), 4)), errors(60.0), errors(50.0)
+
+    def p_value(before: HeldOut, after: HeldOut, *_: object) -> float:
+        return 1e-4 if (before, after) == (apart, whole) else 1.0
+
+    monkeypatch.setattr(backward_elimination, "prediction_p_value", p_value)
+    (after,) = backward_elimination.two_runs_by_predictions(found, [apart, whole], lambda _: apart, windows).steps  # type: ignore[arg-type]
     assert after.p_value == pytest.approx(1e-3 if told else 0.11, rel=0.01)
 
 
@@ -249,8 +253,7 @@ def causes_left(monkeypatch, steps: tuple[Step, ...], runs: int, improves, held)
     for name, instead in {
         "improves_held_out": improves,
         "open_candidates": lambda *_: [],
-        "with_runs_counted": lambda selection, *_: selection,
-        "two_runs_by_predictions": lambda selection, *_: selection,
+        "as_told": lambda selection, *_: selection,
         "without_step": lambda given, index, _windows: [*given[:index], *given[index + 1 :]],
     }.items():
         monkeypatch.setattr(backward_elimination, name, instead)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -50,6 +51,7 @@ from expdesign.diagnosis.judgement import (
     gains_on_other_runs,
     harmless_beside_the_file,
     harms,
+    held_without,
     losses_without,
     more_than_noise,
     with_alternatives,
@@ -58,7 +60,7 @@ from expdesign.diagnosis.judgement import (
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import fitted_start, simulate_from_measured, stable_windows
-from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions
+from expdesign.diagnosis.prediction_comparison import RE_ESTIMATED, Compared, compare_predictions
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
@@ -70,7 +72,9 @@ from expdesign.diagnosis.select import (
     leading_candidates,
     select_forward,
     suspected_tests,
+    two_runs_by_predictions,
     with_honest_errors,
+    with_p_values_beside_all,
 )
 from expdesign.diagnosis.stated_parameters import (
     WrongParameters,
@@ -153,8 +157,7 @@ def select_causes(
         progress = reported.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
         return errors_as_judged(found, as_stated, validation, windows, progress, seed)
 
-    comparable = found.steps and found.first.keys and within_stated_std(found.first)
-    re_estimated = validation.of(found.first) if comparable else None
+    re_estimated = validation.of(found.first) if found.steps and found.first.keys else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
     kept = with_parameters_as_rival(kept, held, validation, windows, seed)
     kept, held = harmless_beside_the_file(kept, ship, as_stated, validation, data, seed) or (kept, held)
@@ -163,11 +166,13 @@ def select_causes(
     reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
     dropped = {step.chosen.candidate.cause for step in found.steps} if not kept.steps else set()
     little = explains_little(reached, windows) or any(step.chosen.candidate.imitates for step in kept.steps)
+    # other values of many parameters imitate any cause: where these are no finding, any may be
+    asked = set() if little or RE_ESTIMATED in dropped else dropped
     if dropped or little:
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
-        compared = compare_predictions(begun, short, seed, progress, () if little else dropped)
+        compared = compare_predictions(begun, short, seed, progress, asked)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
-        if by_predictions and not little and by_predictions[0].steps[0].chosen.candidate.cause not in dropped:
+        if by_predictions and asked and by_predictions[0].steps[0].chosen.candidate.cause not in asked:
             by_predictions = None  # where much is explained, predictions confirm what likelihoods found, and no more
         if compared and little and not by_predictions and not kept.steps and found.first.keys:
             stated = compare_predictions(ship.with_known_parameters(), short, seed, progress)
@@ -179,7 +184,10 @@ def select_causes(
         kept, held = by_predictions or (kept, held)
     kept, held = worth_writing(kept, held, ship, as_stated, validation, data, seed)
     rest = with_unlisted_terms(kept, held, windows, validation, seed, rejected)
-    kept, held = without_harm(rest.kept, rest.held, ship, data[1])
+    counted, (kept, held) = kept.steps, without_harm(rest.kept, rest.held, ship, data[1])
+    if len(kept.steps) > 1 and kept.steps != counted:
+        without = partial(held_without, kept, held, validation, windows)
+        kept = two_runs_by_predictions(with_p_values_beside_all(kept), held, without, windows)
     return Selected(
         found=found,
         kept=with_honest_errors(kept),

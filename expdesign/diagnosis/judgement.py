@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +32,10 @@ from expdesign.diagnosis.select import (
     Rival,
     Selection,
     Step,
+    as_told,
     fitted_ahead,
     improves_held_out,
     only_nuisance,
-    open_candidates,
-    with_runs_counted,
     without_step,
 )
 from expdesign.diagnosis.stated_parameters import or_parameters
@@ -225,13 +225,22 @@ def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossV
     """
     if not found.steps:
         return np.zeros(0)
-    *_, last, whole = held[: len(found.steps) + 1]
-    losses = []
-    for index in range(len(found.steps) - 1):
-        others = without_step(list(found.steps), index, windows)
-        one = None if others is None else validation.of(others[-1].chosen.fit).like(whole)
-        losses.append(np.inf if one is None else whole.mean_fit - one.mean_fit)
-    return np.array([*losses, whole.mean_fit - last.mean_fit])
+    whole = held[len(found.steps)]
+    without = (held_without(found, held, validation, windows, index) for index in range(len(found.steps)))
+    return np.array([np.inf if one is None else whole.mean_fit - one.mean_fit for one in without])
+
+
+def held_without(
+    found: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows, index: int
+) -> HeldOut | None:
+    """Errors on held-out data of the model without one cause, the others fitted anew; None where they cannot be.
+
+    Arguments as of `losses_without`.
+    """
+    if index == len(found.steps) - 1:
+        return held[index]
+    others = without_step(list(found.steps), index, windows)
+    return None if others is None else validation.of(others[-1].chosen.fit).like(held[len(found.steps)])
 
 
 def harmless_beside_the_file(
@@ -260,7 +269,8 @@ def harmless_beside_the_file(
     held = _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
     if not all(improves_held_out(known, held, seed)):
         return None
-    return with_runs_counted(known, open_candidates(known.last, windows), np.random.default_rng(seed)), held
+    without = partial(held_without, known, held, validation, windows)
+    return as_told(known, held, without, windows, seed), held
 
 
 def worth_writing(
@@ -289,8 +299,8 @@ def worth_writing(
         beside = _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
         parameters = [validation.of(one.last) for one in (known, kept)]
         if all(improves_held_out(known, beside, seed, windows)) and not gains_on_other_runs(parameters, seed):
-            rng = np.random.default_rng(seed)
-            return with_runs_counted(known, open_candidates(known.last, windows), rng), beside
+            without = partial(held_without, known, beside, validation, windows)
+            return as_told(known, beside, without, windows, seed), beside
     stated, alone, written = _ahead([as_stated, *map(validation.of, (kept.first, kept.last))])
     gains = alone.mean_fit > stated.mean_fit or written.left < (1.0 - SELECTION_TUNING.least_reduction) * stated.left
     return (kept, held) if gains else (kept.with_steps(()), held[:1])

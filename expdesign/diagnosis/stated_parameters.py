@@ -20,7 +20,6 @@ from expdesign.diagnosis.fit import (
     fit,
     gains_for_certain,
     log_likelihood_gain,
-    prediction_gain,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
@@ -31,6 +30,7 @@ from expdesign.diagnosis.select import (
     Rival,
     Selection,
     Step,
+    certain_in_predictions,
     only_nuisance,
     open_candidates,
     shows_for_certain,
@@ -66,9 +66,8 @@ def with_parameters_as_rival(
     alone = parameters_alone(kept, held, validation)
     if alone is None or gains_for_certain([alone, held[1]], seed):
         return kept
-    share, (least, _) = prediction_gain(alone, held[1], windows, kept.steps[0].chosen.fit.noise)
-    certain = least > 0.0 and share >= SELECTION_TUNING.least_predicted
-    return kept if certain else or_parameters(kept, kept.first, windows)
+    share = certain_in_predictions(kept.steps[0], (alone, held[1]), windows, seed)
+    return kept if share >= SELECTION_TUNING.least_predicted else or_parameters(kept, kept.first, windows)
 
 
 def or_parameters(kept: Selection, first: Fit, windows: Windows) -> Selection:

@@ -313,9 +313,8 @@ def note_on_predictions(
     stretches = f"in stretches of {AHEAD_S:g} s, a fifth of every run held out at a time"
     if kept.beside_stated:
         return (
-            f"The search by likelihoods {left}. So causes were compared by predictions {stretches}. Beside parameters "
-            "re-estimated, none was certain. The gain stated is beside the parameters of the vessel file as they are. "
-            "Re-estimated without any cause, these predict no better.",
+            f"The search by likelihoods {left}. So causes were compared by predictions {stretches}. The gain stated is "
+            "beside the parameters of the vessel file as they are: re-estimated, these predict no better for certain.",
         )
     return (
         f"The search by likelihoods {left}. So causes were compared by predictions {stretches}, "

@@ -191,16 +191,29 @@ def _is_unfit(before: Accuracy, findings: Sequence[Finding], unexplained: Unexpl
 
 
 def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplained | None) -> list[str]:
-    """Three sentences of what is missing."""
-    named = []
-    for item in findings:
-        others = alternatives(item)
-        alike = " (these data cannot tell which)" if others else ""
-        named.append(listed([_with_sizes(item), *others], "or") + alike)
+    """Three sentences of what is missing, or of what only shows from one sample to the next."""
+    lacked, shown = ([item for item in findings if (item.predicted is None) is alone] for alone in (True, False))
+    what = []
+    if lacked:
+        what.append(f"the simulation lacks {listed(_named(lacked))}")
+    if shown:
+        them = "them" if len(shown) > 1 else "it"
+        but = f"simulations get no better with {them} for certain"
+        what.append(f"the record shows {listed(_named(shown))}, but {but}")
     sure = _benefits(findings, unit)
     if unexplained is not None:
         sure += f"; much remains unexplained, {_fits(unexplained)}"
-    return [f"The simulation lacks {listed(named)}", sure, _advice(findings)]
+    return [_capital("; ".join(what)), sure, _advice(findings)]
+
+
+def _named(findings: Sequence[Finding]) -> list[str]:
+    """Each with its sizes and its alternatives."""
+    found = []
+    for item in findings:
+        others = alternatives(item)
+        alike = " (these data cannot tell which)" if others else ""
+        found.append(listed([_with_sizes(item), *others], "or") + alike)
+    return found
 
 
 TOWARDS = {"north_mps": "north", "east_mps": "east"}

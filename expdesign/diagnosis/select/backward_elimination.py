@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,7 @@ from expdesign.diagnosis.fit import (
     on_common_units,
     prediction_gain,
     prediction_p_value,
+    within_stated_std,
 )
 from expdesign.diagnosis.select.selection import (
     Selection,
@@ -61,8 +63,8 @@ def eliminate_backward(
             found = later
             continue
         whole, found = found, before_first_without_gain(found, improves)
-        counted = with_runs_counted(found, open_candidates(found.last, windows), np.random.default_rng(seed))
-        counted = two_runs_by_predictions(counted, held, windows)
+        without = partial(_held_without, found, held, windows, cross_validated)
+        counted = as_told(found, held, without, windows, seed)
         for index in insignificant_steps(counted.steps):
             others = without_step(list(whole.steps), index, windows)
             if others is None:
@@ -96,19 +98,54 @@ def _are_two_runs(windows: Windows) -> bool:
     return len(np.unique(windows.batch)) == FEWEST_RUNS - 1
 
 
-def two_runs_by_predictions(found: Selection, held: Sequence[HeldOut], windows: Windows) -> Selection:
+def as_told(
+    found: Selection,
+    held: Sequence[HeldOut],
+    without: Callable[[int], HeldOut | None],
+    windows: Windows,
+    seed: int,
+) -> Selection:
+    """The selection with standard errors and p-values that count how runs differ.
+
+    Args:
+        held: errors on held-out units of the model before any cause, then after every step.
+        without: those of the model of all causes but one, by its place.
+    """
+    counted = with_runs_counted(found, open_candidates(found.last, windows), np.random.default_rng(seed))
+    return two_runs_by_predictions(counted, held, without, windows)
+
+
+def _held_without(
+    found: Selection,
+    held: Sequence[HeldOut],
+    windows: Windows,
+    cross_validated: Callable[[Selection], tuple[Selection, list[HeldOut]]],
+    index: int,
+) -> HeldOut | None:
+    """Errors on held-out units of the model without one cause, the others fitted again; None where they cannot be."""
+    if index == len(found.steps) - 1:
+        return held[index]
+    others = without_step(list(found.steps), index, windows)
+    return None if others is None else cross_validated(found.with_steps(tuple(others)))[1][len(others)]
+
+
+def two_runs_by_predictions(
+    found: Selection, held: Sequence[HeldOut], without: Callable[[int], HeldOut | None], windows: Windows
+) -> Selection:
     """Causes in two runs with p-values of predictions from one sample to the next, where these show them better.
 
     Of how runs differ two tell with one degree of freedom, which makes nothing significant. Held-out parts of them do:
-    what is said is of these runs sailed on, as intervals of gains are.
+    what is said is of these runs sailed on, as intervals of gains are. Arguments as of `as_told`.
     """
-    if not _are_two_runs(windows):
+    if not found.steps or not _are_two_runs(windows):
         return found
+    whole = held[len(found.steps)]
 
     def told(index: int, step: Step) -> Step:
-        if not _may_show_in_predictions(step):
+        before = without(index) if _may_show_in_predictions(step) else None
+        if before is None:
             return step
-        pair = held[index], held[index + 1], windows, step.chosen.fit.noise
+        pair = before.like(whole), whole.like(before), windows, step.chosen.fit.noise
         p_value = of_several(prediction_p_value(*pair), step.chosen.multiplicity)
         shown = p_value < step.p_value and prediction_gain(*pair)[0] >= TUNING.least_predicted
         return replace(step, p_value=p_value) if shown else step
@@ -170,8 +207,10 @@ def improves_held_out(
     it is but for the cause: parameters of a file that were fitted to the same data have seen what is held out, those
     fitted with a cause have not. Or it shows in predictions from one sample to the next, where simulations say too
     little. A cause that imitates none may show in these beside simulations that lose nothing on average; one that
-    imitates others, or a later one, if these gain by enough, too. Several parameters at once, which imitate any cause,
-    never do, nor does a change of the ship, whose time is chosen where predictions are worst.
+    imitates others, or a later one, if these gain by enough, too. It has to do so beside the model with its uncertain
+    parameters fitted as well, which may be all that is gained, unless stretches of other runs show both together.
+    Several parameters at once, which imitate any cause, never do, nor does a change of the ship, whose time is chosen
+    where predictions are worst.
 
     Args:
         held: errors on held-out units of the model before any cause, then after every step.
@@ -201,11 +240,43 @@ def improves_held_out(
         return improves
     if not shows_for_certain(held[0], held[1], seed):
         improves[0] = _shows_otherwise(found, held, (better[0], gains[0]), (windows, re_estimated), seed)
-    for index, step in enumerate(found.steps[1:], 1):
-        if better[index] and not improves[index] and _may_show_in_predictions(step):
-            share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
-            improves[index] = least > 0.0 and share >= TUNING.least_predicted
+    for index in range(1, len(held) - 1):
+        if better[index] and not improves[index]:
+            share = certain_in_predictions(found.steps[index], held[index : index + 2], windows, seed)
+            improves[index] = share >= TUNING.least_predicted
     return improves
+
+
+def certain_in_predictions(step: Step, held: Sequence[HeldOut], windows: Windows, seed: int) -> float:
+    """Share that a cause takes off the squared error of predictions one sample ahead, for certain; else 0.
+
+    What makes held-out simulations of any output worse for certain shows a record that is not like the model, and not
+    what a simulation lacks.
+
+    Args:
+        held: errors on held-out units without and with it.
+    """
+    if not _may_show_in_predictions(step):
+        return 0.0
+    share, (least, _) = prediction_gain(held[0], held[1], windows, step.chosen.fit.noise)
+    if not least > 0.0 or any(_some_worse_for_certain(pair, seed) for pair in _as_simulated(held)):
+        return 0.0
+    return share
+
+
+def _as_simulated(held: Sequence[HeldOut]) -> Iterator[list[HeldOut]]:
+    """Errors as they are given, in stretches, and in stretches of runs that models were not fitted to."""
+    yield [*held]
+    for of in ("ahead", "on_other_runs"):
+        measured = [getattr(item, of) for item in held]
+        if all(measured):
+            yield [one() for one in measured]
+
+
+def _some_worse_for_certain(held: Sequence[HeldOut], seed: int) -> bool:
+    """Whether the error of some output is larger in the second of two models, by an interval that excludes zero."""
+    _, _, high = certain_reductions(held[0], held[1], seed)
+    return bool((high < 0.0).any())
 
 
 def _may_show_in_predictions(step: Step) -> bool:
@@ -228,24 +299,42 @@ def _shows_otherwise(
     """
     (better, (gain, (low, high))), (windows, re_estimated) = simulated, data
     first = found.steps[0].chosen
-    share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
+    share = certain_in_predictions(found.steps[0], held[:2], windows, seed)
+    alike = _fitted_alike(found, held, re_estimated)
+    if alike and not _shows_in_other_runs(held, seed):  # all of it may be what parameters gain
+        share = min(share, certain_in_predictions(found.steps[0], (*alike, held[1]), windows, seed))
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
     alone = share >= TUNING.least_predicted and not first.candidate.imitates and gain >= 0.0
-    if least > 0.0 and _may_show_in_predictions(found.steps[0]) and (alone or (better and worth_a_word)):
+    if alone or (better and worth_a_word):
         return True
     beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
     return beside is not None and shows_for_certain(beside, held[1], seed)
 
 
+def _shows_in_other_runs(held: Sequence[HeldOut], seed: int) -> bool:
+    """Whether a first cause shows for certain in stretches of runs that models were not fitted to."""
+    measured = [item.on_other_runs() for item in held[:2] if item.on_other_runs is not None]
+    return len(measured) == 2 and shows_for_certain(measured[0], measured[1], seed)
+
+
+def _fitted_alike(found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None) -> list[HeldOut]:
+    """Errors of the model without the first cause, its uncertain parameters fitted as they are with it, if there are.
+
+    None where the cause is that its parameters are wrong. Arguments as of `improves_held_out`.
+    """
+    if re_estimated is None or found.beside_stated or found.steps[0].chosen.candidate.cause == "parameters":
+        return []
+    return [re_estimated.like(held[1])]
+
+
 def held_beside_the_same_fit(found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None) -> HeldOut | None:
     """Errors of the model without the first cause that is fitted in the same way.
 
-    None where there is no such model, or the cause is that its parameters are wrong. Arguments as of
-    `improves_held_out`.
+    None where there is no such model that the vessel file allows, or the cause is that its parameters are wrong.
+    Arguments as of `improves_held_out`.
     """
-    if re_estimated is None or found.beside_stated or found.steps[0].chosen.candidate.cause == "parameters":
-        return None
-    return re_estimated.like(held[1])
+    alike = _fitted_alike(found, held, re_estimated)
+    return alike[0] if alike and within_stated_std(found.first) else None
 
 
 def compared_with(

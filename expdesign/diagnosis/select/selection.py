@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -120,8 +120,14 @@ def _fit_without(whole: Fit, step: Step, windows: Windows) -> Fit | None:
     """A later fit without the effects of a step, all others estimated again."""
     own = _own_effects(step)
     others = tuple(key for key in whole.free_keys if key not in own)
+    return _refitted(whole, others, windows, without=own)
+
+
+def _refitted(whole: Fit, free: tuple[str, ...], windows: Windows, *, without: Collection[str] = ()) -> Fit | None:
+    """A fit with these effects estimated again and without others; None where that cannot be fitted."""
     try:
-        return fit(whole.ship.without_effects(own), windows, others, starts=whole.starts, options=continuing(whole))
+        ship = whole.ship.without_effects({*without})
+        return fit(ship, windows, free, starts=whole.starts, options=continuing(whole))
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
 
@@ -139,13 +145,35 @@ def with_runs_counted(found: Selection, candidates: Sequence[Candidate], rng: np
     steps = [
         replace(
             step,
-            chosen=(chosen := _with_wider_profile(step.chosen, known)),
-            p_value=p_value_between_runs(chosen, last, known),
+            chosen=_with_wider_profile(step.chosen, known),
             alternatives=_equivalent(step.alternatives, known),
         )
         for step in found.steps
     ]
-    return replace(found, steps=tuple(steps), last=last, last_tests=tests, dispersion=known)
+    counted = replace(found, steps=tuple(steps), last=last, last_tests=tests, dispersion=known)
+    return with_p_values_beside_all(counted)
+
+
+def with_p_values_beside_all(found: Selection) -> Selection:
+    """The selection, each cause with the p-value and likelihood gain of taking it away beside all others.
+
+    What one gained on those before it, it gained under noise that held all that was found later.
+
+    Source: as of `judgement.losses_without`.
+    """
+    gains = [step.chosen.likelihood_gain for step in found.steps]
+    windows = found.last.linear.motion.windows
+    whole = _refitted(found.last, found.last.free_keys, windows) if len(gains) > 1 else None
+    for index, step in enumerate(found.steps[:-1]):
+        reduced = None if whole is None else _fit_without(whole, step, windows)
+        if whole is not None and reduced is not None:
+            gains[index] = log_likelihood_gain(reduced, whole)
+    chosen = [replace(step.chosen, likelihood_gain=gain) for step, gain in zip(found.steps, gains, strict=True)]
+    steps = [
+        replace(step, chosen=one, p_value=p_value_between_runs(one, found.last, found.dispersion))
+        for step, one in zip(found.steps, chosen, strict=True)
+    ]
+    return replace(found, steps=tuple(steps))
 
 
 def _equivalent(rivals: Sequence[Rival], known: Dispersion) -> tuple[Rival, ...]:
