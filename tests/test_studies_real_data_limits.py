@@ -1,5 +1,6 @@
 """What limits a fit is found: constants, noise, instability and uncertain parameters where nothing else acts."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,19 @@ def test_a_constant_force_is_named_as_one() -> None:
     words = sentence(limits, run)
     assert "The worst output is v" in words
     assert "100 % from a constant unmodelled force" in words or "99 % from a constant unmodelled force" in words
+
+
+@pytest.mark.parametrize("shares", [(0.7, 0.2, 0.1), (-0.13, 0.65, 0.48), (1.05, -0.03, -0.02), (-0.004, 0.5, 0.504)])
+def test_shares_that_cancel_others_are_said_to_and_all_add_up(shares: tuple[float, float, float]) -> None:
+    limits, run = judged(driven(push=400.0))
+    constant, slow, quick = (np.full(3, share) for share in shares)
+    words = sentence(replace(limits, constant=constant, slow=slow, quick=quick), run)
+    parts = words.partition("Its squared error: ")[2].partition(".")[0]
+    assert "-" not in parts
+    added = sum(int(text) for text in re.findall(r"(\d+) % from", parts))
+    taken = sum(int(text) for text in re.findall(r"less (\d+) % by", parts))
+    assert added - taken == pytest.approx(100, abs=1)
+    assert bool(taken) == (min(shares) < -0.005)
 
 
 def test_noise_is_quick_and_its_size_is_seen() -> None:

@@ -261,7 +261,9 @@ def sentence(limits: Limits, run: RunCheck) -> str:
     )
     if not np.isfinite([share for _, share in causes]).all():
         return tail
-    parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
+    percent = [(round(100 * share), what) for what, share in sorted(causes, key=lambda c: -c[1])]
+    parts = ", ".join(f"{size} % from {what}" for size, what in percent if size >= 0)
+    parts += "".join(f", less {-size} % by {what} of opposite sign" for size, what in percent if size < 0)
     if max(abs(share) for _, share in causes) > CANCELLING_SHARE:
         parts = "parts of opposite sign, so no single cause can be named"
     doubt = limits.parameters[worst]
