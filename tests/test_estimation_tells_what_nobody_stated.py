@@ -16,7 +16,7 @@ from expdesign.assessment.unstated import _surest
 from expdesign.errors import Diverged
 from expdesign.estimation.methods import Method
 from expdesign.estimation.output_error import ActuatorTime
-from expdesign.export.estimate_page import answer_sentence, current_sentence
+from expdesign.export.files import answer_sentence, current_sentence, estimate_json, estimated_vessel
 from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record
@@ -108,7 +108,10 @@ def test_what_nobody_stated_is_told_with_its_size(kind: str) -> None:
     north, east = unknown["current_to"]
     assert np.hypot(told.current.north_mps - north, told.current.east_mps - east) < 5 * told.current.std_mps
     toward = np.degrees(np.arctan2(told.current.east_mps, told.current.north_mps)) % 360
-    assert f"towards {toward:.0f} deg" in current_sentence(told.current)
+    said = current_sentence(told.current)
+    assert f"towards {toward:.0f} deg" in said
+    for text in (estimate_json(told, SHIP), estimated_vessel(told, SHIP, command="estimate").replace("\n# ", " ")):
+        assert said in text, "who reads the file is not told"
 
 
 @pytest.mark.parametrize("late_s", [6.0, *(pytest.param(size, marks=pytest.mark.thorough) for size in (2.0, 3.5))])

@@ -103,6 +103,20 @@ def test_a_ship_that_is_not_as_her_file_says_is_told_with_both_numbers(tmp_path:
     assert f"The ship is not as her file said: {name} is" in page
 
 
+@pytest.mark.parametrize("key", ["unstated", "doubts"])
+def test_what_the_estimate_warns_of_stands_beside_what_is_said_of_the_ship(key: str) -> None:
+    """A current that nobody knew of moved parameters by four standard deviations, and the ship was called another."""
+    plan, said = json.loads(plan_text()), "The data show a steady current of 0.11 m/s."
+    off = {case.design().problem.parameters[2]: -6.0}
+    estimate = json.loads(estimate_text(plan, off=off))["iv"]
+    (estimate if key == "unstated" else estimate["data"])[key] = [said]
+    page = result_document(contents(plan, estimate))
+    assert said in page.notes
+    (line,) = [line for line in page.findings if "as her file said" in line]
+    assert line.startswith("The ship seems not to be")
+    assert line.endswith("may be why.")
+
+
 def test_a_ship_as_her_file_says_is_seldom_called_another() -> None:
     """The rate over draws of prior and noise is at most the stated one, by three standard errors."""
     plan, draws, rng = json.loads(plan_text()), 400, np.random.default_rng(3)

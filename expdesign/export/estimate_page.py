@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from markupsafe import Markup
 
-from expdesign.assessment import Answer, Assessed, Assessment, Current, Moved, sentence
+from expdesign.assessment import Assessed, Assessment, sentence
 from expdesign.assessment.misfit import AHEAD_S
 from expdesign.conventions import plus_minus
 from expdesign.estimation.excitation import sample_notes
@@ -28,8 +28,9 @@ from expdesign.export.files import (
     prediction_table,
     rows_by_equation,
     unstable_warning,
+    unstated_sentences,
 )
-from expdesign.vessel import LEAST_KEPT, NOT_ACTING_BACK, Vessel, VesselModel, column_name
+from expdesign.vessel import LEAST_KEPT, NOT_ACTING_BACK, Vessel, VesselModel
 
 FAST_DECAY = 1e-3  # growth of an initial error below which the table says that it decays
 DRAWN_METHODS = 3  # largest number of methods in the figures of runs
@@ -87,8 +88,7 @@ def advice(found: Assessment) -> list[str]:
             "effect, such as wind, current, waves or a term. No method is consistent with a wrong model structure, "
             "and the standard deviations do not include this error. The command diagnose searches for the cause."
         )
-    sentences += [current_sentence(flow)] if (flow := found.current) is not None else []
-    sentences += map(answer_sentence, found.answers)
+    sentences += unstated_sentences(found)
     if not best.stable:
         sentences.append(
             "No estimate can simulate every run, so none is ready for use. Runs with smaller unmodelled effects help, "
@@ -109,34 +109,6 @@ def out_of_range(model: VesselModel) -> list[str]:
         f"{where}. No plan can be tried with ships of vessel-estimated.toml: --prior parameter_std joins what the "
         "file knew before, and more runs tell more."
     ]
-
-
-def current_sentence(flow: Current) -> str:
-    """What a current that nobody stated does to the estimates, and what helps."""
-    toward_deg = math.degrees(math.atan2(flow.east_mps, flow.north_mps)) % 360
-    speed = plus_minus(math.hypot(flow.north_mps, flow.east_mps), flow.std_mps)
-    return (
-        f"The data show a steady current of {speed} m/s towards {toward_deg:.0f} deg, or another push that keeps its "
-        f"direction on the earth. It moves {_moved(flow.moved)} of estimates that know of none; --unknown "
-        "steady-current estimates it, too."
-    )
-
-
-def answer_sentence(answer: Answer) -> str:
-    """What an input that the ship answers at another time does to the estimates, and what helps."""
-    late, column = plus_minus(abs(answer.late_s), answer.std_s), column_name(answer.signal)
-    when = "later" if answer.late_s > 0 else "sooner"
-    unknown_s = max(0.5, round(2 * abs(answer.late_s), 1))
-    return (
-        f"The ship answers {column} {late} s {when} than recorded orders and vessel file say: dead times are rarely "
-        "known, and an order may be up to one row older than the row that shows it. That moves "
-        f"{_moved(answer.moved)}; [std] {answer.signal}_delay_s = {unknown_s:g} in the vessel file lets oe estimate "
-        f"the time, too, and a measured position belongs under reached_{column}."
-    )
-
-
-def _moved(most: Moved) -> str:
-    return f"{most.parameter} by {most.by_std:.0f} of its standard deviations"
 
 
 def _names(best: Assessed, chosen: np.ndarray) -> str:

@@ -100,6 +100,7 @@ class RecordedRuns(Entry):
     """All of them."""
 
     runs: list[Recorded] = Field(min_length=1)
+    doubts: list[str] = Field(default_factory=list)
 
 
 class Estimated(Entry):
@@ -111,6 +112,7 @@ class Estimated(Entry):
     predictions: dict[str, dict[str, float | None]]
     sample_time_s: float
     data: RecordedRuns
+    unstated: list[str] = Field(default_factory=list)
 
 
 class Judged(Entry):
@@ -211,7 +213,7 @@ def result_document(content: ResultContent) -> Document:
                 "and the model's units of force.",
             ),
         ),
-        notes=_left_out(content),
+        notes=(*_left_out(content), *_in_doubt(content.estimate)),
     )  # fmt: skip
 
 
@@ -271,6 +273,11 @@ def _left_out(content: ResultContent) -> tuple[str, ...]:
     )
 
 
+def _in_doubt(estimate: Estimated) -> tuple[str, ...]:
+    """What puts the estimate into question: what nobody stated, and what the data's instruments disagree about."""
+    return (*estimate.unstated, *estimate.data.doubts)
+
+
 def _changed(content: ResultContent) -> str:
     """Parameters that the trial has shown to be others than the vessel file says, by Bonferroni."""
     off = {name: value for name in content.plan.parameters if (value := _deviations(content, name)) is not None}
@@ -286,7 +293,11 @@ def _changed(content: ResultContent) -> str:
         for name, found, before in ((n, content.estimate.parameters[n], content.plan.parameters[n]) for n in far[:3])
     )
     more = f"; {len(far) - 3} more" if len(far) > 3 else ""
-    return f"The ship is not as her file said: {told}{more}."
+    where = (
+        "What notes say of current, times of orders or instruments may be why" if _in_doubt(content.estimate) else ""
+    )
+    seems = "seems not to be" if where else "is not"
+    return f"The ship {seems} as her file said: {told}{more}.{f' {where}.' if where else ''}"
 
 
 def _deviations(content: ResultContent, name: str) -> float | None:

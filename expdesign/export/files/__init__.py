@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         toml_table,
         toml_value,
     )
+    from expdesign.export.files.unstated import answer_sentence, current_sentence, unstated_sentences
     from expdesign.export.files.vessel_file import vessel_toml
 else:
     __getattr__, __all__ = load_on_use(__name__, __file__)

@@ -21,6 +21,7 @@ from expdesign.export import words
 from expdesign.export.document import Table
 from expdesign.export.files.disturbances import disturbance_entries
 from expdesign.export.files.text import entry, finite, named_finite, strict_json, valued
+from expdesign.export.files.unstated import unstated_sentences
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.vessel import Vessel
 
@@ -152,6 +153,7 @@ def estimate_values(found: Assessment) -> dict[str, Any]:
     return {
         **({"why": found.why} if found.why else {}),
         "parameters_of": found.motion,
+        "unstated": list(unstated_sentences(found)),
         "what_limits_the_fit": limit_entries(found),
         "methods_left_out": list(found.left_out),
         "methods": {
@@ -226,6 +228,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         "instruments": _instruments(found, item),
         "warnings": list(estimate_warnings(found, item)),
         "in_vessel_file": item is found.best,
+        "unstated": list(unstated_sentences(found)) if item is found.best else [],
         "what_limits_the_fit": limit_entries(found) if item is found.best else None,
         "data": _data(found),
     }
@@ -240,7 +243,7 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
     comments = [
         f"Parameters estimated by {best.method.title} ({best.method.name}) from",
         f"{files}{more}.",
-        *textwrap.wrap(found.why, COMMENT_WIDTH),
+        *(line for text in (found.why, *unstated_sentences(found)) for line in textwrap.wrap(text, COMMENT_WIDTH)),
         "The other estimates are in estimate.json. parameter_std holds the standard deviations of the estimates.",
         motion_words(found),
         *([f"Fixed parameters, without standard deviation: {held}."] if held else []),
@@ -330,6 +333,7 @@ def _data(found: Assessment) -> dict[str, Any]:
             for use, record in ((ESTIMATION, found.record), (TEST, found.tests))
             for batch in record.batches
         ],
+        "doubts": list(dict.fromkeys([*found.record.doubts, *found.tests.doubts])),
         "notes": [*found.record.notes, *found.tests.notes],
         "methods_left_out": list(found.left_out),
     }
