@@ -1,5 +1,6 @@
 """Families that give commands work on any vessel, also one whose model reads propeller and rudder directly."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from expdesign.errors import InputError, Unreachable
 from expdesign.export.files.design_files import dictionary_files
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
-from expdesign.simulation import Conduct, simulate, steady_ahead, zigzag
+from expdesign.simulation import Conduct, simulate, simulate_many, steady_ahead, zigzag
 from rudder_ship import rudder_ship
 
 ORDERED = tuple(item for item in FAMILIES if item.orders is not None and item.name != "recorded")
@@ -92,6 +93,31 @@ def test_a_crash_stop_ends_the_way_ahead_and_does_not_go_astern(ship: str):
 def test_a_crash_stop_takes_the_way_off_faster_than_idling():
     hard, idle = (build_primitive(rudder_ship(), request("crash_stop", astern=share)) for share in (1.0, 0.0))
     assert hard.trajectory.velocity[-1, 0] < 0 < idle.trajectory.velocity[-1, 0]
+
+
+def test_a_stop_without_a_stated_time_lasts_until_ships_of_the_prior_lie_still():
+    """95 of 100 other ships than those that gave the time, within four standard errors; of a known ship, just her."""
+    ship, count = rudder_ship(), 400
+    known = replace(ship, model=replace(ship.model, parameter_std=np.zeros(len(ship.model.names)), unstated_std={}))
+    spec = request("crash_stop", duration_s=0.0)
+    alone = build_primitive(known, spec)
+    assert alone.exit_velocity[0] <= 0.0 < alone.trajectory.velocity[-3, 0]
+    model = replace(ship.model, parameter_std=0.1 * np.abs(ship.model.parameters), unstated_std={})
+    run = build_primitive(replace(ship, model=model), spec)
+    assert run.duration_s > alone.duration_s
+    states = simulate_many(
+        ship, run.commands, pose=np.zeros((count, 3)), velocity=np.tile(run.entry_velocity, (count, 1)),
+        current_to=np.zeros((count, 2)), wind_to=np.zeros((count, 2)), standing=run.entry_inputs,
+        parameters=model.drawn_parameters(count, np.random.default_rng(8)),
+    )  # fmt: skip
+    stopped = (states[:, :, 3] <= 0.0).any(axis=0).mean()
+    assert abs(stopped - 0.95) < 4 * np.sqrt(0.95 * 0.05 * (1 / count + 1 / 200))
+
+
+def test_a_ship_that_does_not_stop_needs_a_stated_time():
+    with pytest.raises(InputError, match=r"does not lie still .* expected a duration_s") as caught:
+        build_primitive(rudder_ship(), request("crash_stop", duration_s=0.0, astern=0.0))
+    assert one_line(caught.value)
 
 
 def test_helm_that_the_actuators_cannot_give_is_refused_with_file_and_key():

@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.dictionary import build_primitive
 from expdesign.errors import NoPlan
+from expdesign.indices import Stop, measured_trial
 from expdesign.scenario import Scenario, load_scenario, load_vessel
+from expdesign.simulation import Environment, simulate
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
 from expdesign.workflows.commands.new import KINDS
@@ -29,6 +32,7 @@ from expdesign.workflows.steps.first_trial import (
     legs_for_most,
 )
 from expdesign.workflows.steps.scored import actuation_remarks, speed_remarks
+from measured_trials import as_batch
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -62,6 +66,24 @@ def test_candidates_of_each_kind_tell_of_every_parameter(kind: str, tmp_path: Pa
     whole = sum(item.X for item in scored(case))
     scale = np.sqrt(np.diag(whole))
     assert np.linalg.eigvalsh(whole / np.outer(scale, scale))[0] > 1e-6
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "asv"])
+def test_stops_of_each_kind_are_stops_of_drawn_ships_in_a_cross_current(kind: str, tmp_path: Path) -> None:
+    """95 %, within four standard errors; none lay still when the dictionaries stated times."""
+    case, count = load_scenario(new(tmp_path / kind, kind=kind).files[0]), 60
+    ship, rng = case.vessel, np.random.default_rng(3)
+    (spec,) = (one for one in case.dictionary if one.family == "crash_stop")
+    run = build_primitive(ship, spec)
+    across, found = Environment(current_to=(0.0, 0.3)), []
+    for values in ship.model.drawn_parameters(count, rng):
+        other = replace(ship, model=ship.model.with_parameters(values))
+        start = {"velocity": run.entry_velocity, "standing": run.entry_inputs}
+        found.append(measured_trial(other, as_batch(other, run.commands, simulate(
+            other, run.commands, environment=across, **start
+        ))))  # fmt: skip
+    stopped = np.mean([isinstance(one, Stop) for one in found])
+    assert stopped > 0.95 - 4 * np.sqrt(0.95 * 0.05 / count)
 
 
 def test_a_folder_that_exists_and_a_kind_that_does_not_are_refused(tmp_path: Path, capsys) -> None:

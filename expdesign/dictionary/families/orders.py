@@ -8,6 +8,7 @@ for the spiral.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpe
 from expdesign.dictionary.trim import hold
 from expdesign.errors import InputError
 from expdesign.signals import Commands
-from expdesign.simulation import Conduct, simulate, zigzag
+from expdesign.simulation import Conduct, simulate_many, zigzag
 from expdesign.simulation.helm import Approach, steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel, within_limits
@@ -84,31 +85,63 @@ def helm_family(
     return orders
 
 
+# Crash stop: engines astern until she lies still. Where the file states no time, slower ships of the prior do, too.
+
+STOPPED_SHARE = 0.95  # of the ships of the prior that lie still at the end of a stop of their own length
+STOPPED_DRAWS = 200
+LONGEST_STOP = 3.0  # times that of the nominal ship, however long the rest take
+WATCHED_LENGTHS = 40.0  # ship lengths at the approach's speed in which a ship is seen to stop
+
+
 def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
-    approach = steady_ahead(vessel, request.settings["speed_mps"])
-    time_s, astern = run_times(vessel, request), -request.settings["astern"]
-    if share := request.settings["astern_fraction"]:
-        braking = time_s < share * request.settings["duration_s"]
-        return ordered(approach, np.where(braking, astern, 0.0), 0.0 * time_s)
+    approach, given = steady_ahead(vessel, request.settings["speed_mps"]), request.settings
+    astern, step_s = -given["astern"], vessel.sample_time_s
+    length_s = given["duration_s"] or WATCHED_LENGTHS * vessel.length_m / float(approach.velocity[0])
+    time_s = step_s * np.arange(round(length_s / step_s))
+    if given["duration_s"] and (share := given["astern_fraction"]):
+        return ordered(approach, np.where(time_s < share * length_s, astern, 0.0), 0.0 * time_s)
     whole = ordered(approach, np.full_like(time_s, astern), 0.0 * time_s)
-    sample_s = vessel.sample_time_s
-    values = within_limits(vessel.actuators, whole.commands, sample_time_s=sample_s, before=approach.inputs)
-    orders = Commands(sample_time_s=sample_s, names=vessel.model.inputs, values=values)
-    u_mps = simulate(vessel, orders, velocity=approach.velocity, standing=approach.inputs).velocity[:-1, 0]
-    still = np.cumsum(u_mps <= 0.0) > 0
-    return ordered(approach, np.where(still, 0.0, astern), 0.0 * time_s) if still.any() else whole
+    drawn = vessel.model.drawn_parameters(STOPPED_DRAWS, np.random.default_rng(0)) if not given["duration_s"] else ()
+    still = _still(vessel, whole, [vessel.model.parameters, *drawn])
+    if given["duration_s"]:
+        return ordered(approach, np.where(time_s < step_s * still[0], astern, 0.0), 0.0 * time_s)
+    if still[0] == len(time_s):
+        raise InputError(
+            f"the nominal ship does not lie still {length_s:.4g} s after engines are ordered to {given['astern']:g} of "
+            "full astern, expected a duration_s"
+        )
+    samples = 1 + int(min(np.quantile(still, STOPPED_SHARE, method="higher"), LONGEST_STOP * still[0]))
+    return Excitation(velocity=whole.velocity, inputs=whole.inputs, commands=whole.commands[:samples])
+
+
+def _still(vessel: Vessel, run: Excitation, parameters: list[Array]) -> Array:
+    """(n,) samples after which ships of these parameters have no headway in a run; its length where they keep some."""
+    commands = within_limits(vessel.actuators, run.commands, sample_time_s=vessel.sample_time_s, before=run.inputs)
+    pose = np.zeros((len(parameters), 3))
+    states = simulate_many(
+        vessel, Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=commands), pose=pose,
+        velocity=pose + run.velocity, standing=run.inputs, current_to=pose[:, :2], wind_to=pose[:, :2],
+        parameters=np.array(parameters),
+    )  # fmt: skip
+    ahead = np.nan_to_num(states[:-1, :, 3], nan=1.0) > 0.0
+    return np.asarray(np.cumprod(ahead, axis=0).sum(axis=0))
 
 
 CRASH_STOP = Family(
     name="crash_stop",
     summary="engines astern from a straight approach until the ship lies still or for a share of the run, then stopped",
     settings=(
-        DURATION,
+        replace(
+            DURATION,
+            meaning="duration of one run; 0 for engines astern until 95 % of the ships of the prior lie still",
+            default=0.0,
+            low=0.0,
+        ),
         APPROACH,
         share_setting("astern", "engine order, 1 for full astern", default=1.0),
         share_setting(
             "astern_fraction",
-            "share of the run that engines go astern; 0 for until the nominal ship lies still",
+            "share of a stated duration that engines go astern; 0 for until the nominal ship lies still",
             default=0.0,
         ),
     ),

@@ -138,9 +138,9 @@ def _length_s(case: Scenario, spec: PrimitiveSpec) -> float:
 
 def _cut(case: Scenario, spec: PrimitiveSpec, rng: np.random.Generator) -> PrimitiveSpec | None:
     """A specification that lasts as long as most ships keep near the track; None where that is too short."""
-    vessel, share = case.vessel, 1.0
+    vessel, share, whole_s = case.vessel, 1.0, _length_s(case, spec)
     while share >= SHORTEST:
-        shorter = _of_length(spec, share * spec.settings["duration_s"], vessel.sample_time_s)
+        shorter = spec if share == 1.0 else _of_length(spec, share * whole_s, vessel.sample_time_s)
         near = _near(case, shorter, rng)
         if near >= 1.0:
             return shorter
