@@ -97,7 +97,7 @@ def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     approach, given = steady_ahead(vessel, request.settings["speed_mps"]), request.settings
     astern, step_s = -given["astern"], vessel.sample_time_s
     length_s = given["duration_s"] or WATCHED_LENGTHS * vessel.length_m / float(approach.velocity[0])
-    time_s = step_s * np.arange(round(length_s / step_s))
+    time_s = np.asarray(step_s * np.arange(round(length_s / step_s)), dtype=float)
     if given["duration_s"] and (share := given["astern_fraction"]):
         return ordered(approach, np.where(time_s < share * length_s, astern, 0.0), 0.0 * time_s)
     whole = ordered(approach, np.full_like(time_s, astern), 0.0 * time_s)
