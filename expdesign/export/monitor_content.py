@@ -105,13 +105,19 @@ def sentences(content: MonitorContent) -> tuple[str, ...]:
 def _sentences(content: MonitorContent) -> Iterator[str]:
     state, found = content.state, content.found
     rate = f"with at most one false alarm in {counted(content.false_alarm_days, 'day')} on average"
-    left_out = state.left_out_s / max(state.judged_s + state.left_out_s, 1e-300)
-    if left_out > HALF and state.shoal_s > HALF * state.left_out_s:
-        yield _shoal(content)
-    elif left_out > HALF:
-        unlike = f"Most of the data, {percent(left_out)}, differ from the reference in a way that no change explains"
+    whole_s = max(state.judged_s + state.left_out_s, 1e-300)
+    reasons = {_shoal(content): state.shoal_s, _windy(content): state.wind_s}
+    told = [text for text, left_out_s in reasons.items() if left_out_s]
+    rest_s = state.left_out_s - sum(reasons.values())
+    first = state.left_out_s > HALF * whole_s and rest_s < HALF * state.left_out_s
+    if first:
+        yield from told
+    elif state.left_out_s > HALF * whole_s:
         unknown = "" if found else " Whether it is the same ship is not known: try expdesign diagnose."
-        yield f"{unlike} that is watched for.{unknown}"
+        yield (
+            f"Most of the data, {percent(state.left_out_s / whole_s)}, differ from the reference in a way that no "
+            f"change explains that is watched for.{unknown}"
+        )
     elif not found:
         yield _no_alarm(content, rate)
     for alarm in found:
@@ -128,13 +134,12 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
         )
     yield from _passed(content)
     yield from _beyond(content)
-    if state.shoal_s and not (left_out > HALF and state.shoal_s > HALF * state.left_out_s):
-        yield _shoal(content)
-    left_out -= state.shoal_s / max(state.judged_s + state.left_out_s, 1e-300)
-    if MUCH_LEFT_OUT < left_out <= HALF:
+    if not first:
+        yield from told
+    if MUCH_LEFT_OUT < rest_s / whole_s <= HALF:
         yield (
-            f"{percent(left_out)} of the data were not judged: their error is beyond what the reference shows and "
-            "looks like no change that is watched for. Weather, waves or a sensor may be others."
+            f"{percent(rest_s / whole_s)} of the data were not judged: their error is beyond what the reference "
+            "shows and looks like no change that is watched for. Weather, waves or a sensor may be others."
         )
     for call in content.calls[-SHOWN_CALLS:]:
         yield _call(content, call)
@@ -198,6 +203,17 @@ def _shoal(content: MonitorContent) -> str:
         f"{hours(state.shoal_s)} were not judged: the measured depth_m is less than in the reference, draught over "
         f"depth up to {state.shoalest:.2f} beyond {limit:.2f}. Drag and inertia grow in shallow water, which the model "
         "does not know: give it terms that read the depth, or a reference in such water."
+    )
+
+
+def _windy(content: MonitorContent) -> str:
+    """A measured wind of which the reference does not tell what it does."""
+    state, known = content.state, content.calibration
+    return (
+        f"{hours(state.wind_s)} were not judged: there the measured wind was stronger than in the reference, or came "
+        "from where none came in it, so that the reference tells less than half as well as ever within it what the "
+        f"wind does. The air passed the ship at up to {state.windiest_mps:.3g} m/s, in the reference at up "
+        f"to {known.wind_mps:.3g} (means of stretches)."
     )
 
 
@@ -374,6 +390,7 @@ def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> st
             "vessel": content.vessel,
             "judged_h": state.judged_s / HOUR,
             "not_judged_h": state.left_out_s / HOUR,
+            "not_judged_for": {"depth_h": state.shoal_s / HOUR, "wind_h": state.wind_s / HOUR},
             "rows_without_numbers": content.left_out_rows,
             "rows_not_read": content.unread_rows,
             "threshold": content.limit,

@@ -180,7 +180,10 @@ def _shown(content: MonitorContent) -> Sequence[int]:
     return list(dict.fromkeys([*(alarm.change for alarm in content.found), *best]))[:SHOWN]
 
 
-WINDY = "The wind is measured. What it does was learnt from the reference, so that it is no change of the ship."
+WINDY = (
+    "The wind is measured. What it does was learnt from the reference, so that it is no change of the ship. "
+    "Stretches in a wind unlike the reference's are learnt from and not judged."
+)
 
 
 def monitor_document(content: MonitorContent) -> Document:

@@ -237,6 +237,10 @@ def gone_over(
         gap = (end_s - until_s, float(grams.heading[index]) - heading)
         faded, keep = after_gap(known, nuisance, *gap), nuisance.memory(*gap)
         one = judged(products, among, faded, loads=calibration.loads)
+        if calibration.by_wind(faded, one) > calibration.wind_limit:
+            sums, known = sums.later(keep).unjudged(one), after_stretch(faded, one)
+            until_s, heading = end_s, float(grams.heading[index])
+            continue
         count = float(stretches.counts[index])
         if not fits(one, count, calibration, changed=True):
             cost += calibration.misfit_limit * count  # whatever the cause

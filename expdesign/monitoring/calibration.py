@@ -13,7 +13,17 @@ from scipy.optimize import minimize
 from expdesign.errors import NotInformative
 from expdesign.monitoring.changes import Change
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
-from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
+from expdesign.monitoring.force import (
+    Force,
+    Judged,
+    Known,
+    after_gap,
+    after_stretch,
+    beside,
+    judged,
+    likelihood,
+    surprise,
+)
 from expdesign.values import Array, sealed
 
 KNOWN_WITHIN = 6.0  # a change is watched for where its size is so many standard errors of the reference
@@ -24,6 +34,9 @@ FEWEST_STRETCHES = 40  # of a reference
 # inflation counts
 BLOCK_COUNTS = (160, 80, 40, 20)
 SHOALER = 0.12  # by which draught over depth is beyond the reference's before the water counts as shallower
+# how uncertain forces of the measured wind may be beside the reference's most uncertain, as a ratio of variances: twice
+# as large an error
+WINDS_REACH = 4.0
 MISFIT_DEVIATIONS = 6.0  # standard deviations of the reference's misfit beyond which a stretch is not judged
 LARGEST_SIZE = 10.0  # of changes that are told from errors unlike the reference's, in sizes that matter
 # correlation times of the unmeasured force: first guess of the quick one, and the slow one [s]
@@ -83,11 +96,19 @@ class Calibration:
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
     wanted: Array  # (m,) one for changes that are watched for where they can be, zero for those that are learnt only
     shoal_limit: float  # draught over depth beyond which the water is shallower than the reference's
+    air: tuple[int, ...]  # numbers of the changes that act by the measured wind
+    wind_limit: float  # `by_wind` beyond which the wind is unlike the reference's
+    wind_mps: float  # largest mean speed of the air past the ship in a stretch of the reference [m/s]
 
     @property
     def loads(self) -> NDArray[np.int64]:
-        """(l,) numbers of the changes that a port call may bring."""
-        return np.flatnonzero(self.load)
+        """(l,) numbers of the changes that a port call may bring, and of air drag, which every wind may tell."""
+        return np.array(sorted({*np.flatnonzero(self.load).tolist(), *self.air}), dtype=np.int64)
+
+    @property
+    def _air_places(self) -> NDArray[np.int64]:
+        """(a,) of air drag in `Known`."""
+        return np.asarray(len(self.force.time_s) + np.searchsorted(self.loads, self.air))
 
     @property
     def nuisance(self) -> Force:
@@ -103,6 +124,30 @@ class Calibration:
     def baseline_std(self) -> Array:
         """(m,) standard errors of the baseline."""
         return np.sqrt(np.diag(self.baseline_covariance))
+
+    def by_wind(self, known: Known, one: Judged) -> float:
+        """Squared error that forces of the wind leave in a stretch on average, as the reference tells of air drag.
+
+        That is what the stretch tells of air drag, times the covariance of the reference: it grows as the wind is
+        stronger than there, or comes from where none came.
+
+        Args:
+            known: before the stretch.
+            one: the stretch.
+
+        Source: D. C. Montgomery, E. A. Peck and G. G. Vining, Introduction to Linear Regression Analysis (2012),
+        section 3.8, on extrapolation told by the largest leverage.
+        """
+        own = np.ix_(self._air_places, self._air_places)
+        told = np.linalg.inv(one.gain[own]) - np.linalg.inv(known.covariance[own])
+        return float((told * self.baseline_covariance[np.ix_(self.air, self.air)]).sum())
+
+    def begun(self, force: Force) -> Known:
+        """What is known of force and load where a watch begins: of air drag, what the reference tells."""
+        known = Known.nothing(force)
+        covariance, own = known.covariance.copy(), self._air_places
+        covariance[..., own[:, None], own] = self.baseline_covariance[np.ix_(self.air, self.air)]
+        return replace(known, covariance=covariance)
 
     def called(self, known: Known) -> Known:
         """What is known of force and load after a port call, which may have changed the load."""
@@ -146,6 +191,7 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
     stretches = stretches_of(grams, std, ramp)
     force = _spared(_varying(stretches, variance, grams.stretch_s), grams.time_s, grams.winds)
     score, information = _filtered(stretches, force)
+    air = np.flatnonzero([change.air for change in changes])
     whole = information.sum(axis=0)
     baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
     after = stretches.less(baseline)
@@ -155,7 +201,7 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
     weights = _weights(stretches)
     middle = float(np.median(misfit))
     spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
-    return Calibration(
+    found = Calibration(
         std=std,
         ramp=ramp,
         force=force,
@@ -173,7 +219,13 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
         load=np.array([change.load for change in changes]) if changes else np.zeros(m),
         wanted=np.array([float(change.watched) for change in changes]) if changes else np.ones(m),
         shoal_limit=float(grams.shoal.max()) + SHOALER,
+        air=tuple(air.tolist()),
+        wind_limit=np.inf,
+        wind_mps=float(grams.wind_mps.max()),
     )
+    own = found.baseline_covariance[np.ix_(air, air)]
+    leverage = np.einsum("wij,ij->w", information[:, air[:, None], air], own)
+    return replace(found, wind_limit=WINDS_REACH * float(leverage.max())) if len(air) else found
 
 
 def misfit_of(quadratic: float, score: Array, information: Array, count: float) -> float:

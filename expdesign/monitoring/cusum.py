@@ -141,6 +141,11 @@ def watch(
             continue
         own, loads = _less(products, calibration.baseline), calibration.loads
         one = judged(own, stretches.changes, state.known, loads=loads)
+        if calibration.by_wind(state.known, one) > calibration.wind_limit:
+            state = _learnt(state, own, one, loads)
+            windiest, wind_s = max(state.windiest_mps, float(grams.wind_mps[index])), state.wind_s + duration_s
+            state = replace(state, left_out_s=state.left_out_s + duration_s, wind_s=wind_s, windiest_mps=windiest)
+            continue
         if not fits(one, count, calibration, changed=state.alarm is not None):
             state = replace(state, left_out_s=state.left_out_s + duration_s)
             continue
@@ -162,6 +167,19 @@ def watch(
         if state.shift is not ship:
             return state, tuple(alarms), tuple(steps), index + 1
     return state, tuple(alarms), tuple(steps), len(grams)
+
+
+def _learnt(state: State, products: Array, one: Judged, loads: NDArray[np.int64]) -> State:
+    """The state after a stretch that force and load are learnt from, and that no change is judged by."""
+    other = judged(products, len(state.shift), state.rough, loads)
+    return replace(
+        state,
+        known=after_stretch(state.known, one),
+        rough=after_stretch(state.rough, other),
+        sums=state.sums.unjudged(one),
+        whole=state.whole.unjudged(one),
+        pending=None if state.pending is None else state.pending.unjudged(one),
+    )
 
 
 def _rougher(state: State, products: Array, one: Judged, loads: NDArray[np.int64]) -> State:

@@ -72,12 +72,15 @@ class Grams:
     # (w,) draught over depth, where it is measured and the model does not read it; else zero
     shoal: Array = field(default_factory=lambda: np.zeros(0))
     heading: Array = field(default_factory=lambda: np.zeros(0))  # (w,) mean in each [rad], nan where it is not known
+    # (w,) mean speed of the air past the ship [m/s], where it is measured; else zero
+    wind_mps: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        for name, value in (("shoal", 0.0), ("heading", math.nan)):
+        for name, value in (("shoal", 0.0), ("heading", math.nan), ("wind_mps", 0.0)):
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, np.full(len(self.time_s), value))
-        seal(self, time_s="w", duration_s="w", products="h w c c", counts="h w", budget="w m 3", shoal="w", heading="w")
+        shapes = {name: "w" for name, axis in _ALONG.items() if axis == 0 and name != "kind"}
+        seal(self, **(shapes | {"products": "h w c c", "counts": "h w", "budget": "w m 3"}))
 
     @property
     def changes(self) -> int:
@@ -100,6 +103,7 @@ class Grams:
 
 _ALONG = {
     "time_s": 0, "duration_s": 0, "products": 1, "counts": 1, "budget": 0, "kind": 0, "shoal": 0, "heading": 0,
+    "wind_mps": 0,
 }  # fmt: skip
 """Field of `Grams` -> its axis of stretches."""
 
@@ -154,6 +158,7 @@ def _grams(simulated: Simulated, changes: Sequence[Change], noise: Noise, *, str
         stretch_s=stretch_s,
         shoal=_shoal(linear)[keep],
         heading=_headings(linear)[keep],
+        wind_mps=_wind_mps(linear)[keep],
         ramps=_pushes(linear) + _drifts(linear),
         winds=_winds(linear),
         pushes=_pushes(linear),
@@ -174,6 +179,15 @@ def _shoal(linear: LinearisedMotion) -> Array:
     if read or not windows.has_depth:
         return np.zeros(len(windows.depth_m))
     return np.asarray((ship.draught_m / windows.depth_m).mean(axis=1))
+
+
+def _wind_mps(linear: LinearisedMotion) -> Array:
+    """(w,) of `Grams`."""
+    windows = linear.motion.windows
+    if not windows.has_wind:
+        return np.zeros(len(windows.wind))
+    u, v = np.moveaxis(linear.motion.states[:, :-1, :2] - windows.wind[:, :-1], -1, 0)
+    return np.asarray(np.hypot(u, v).mean(axis=1))
 
 
 def grams_and_noise(

@@ -122,6 +122,10 @@ class Sums:
         """The sums after a gap over which the force's autocorrelation is (f,)."""
         return replace(self, taken=keep[:, None] * self.taken)
 
+    def unjudged(self, one: Judged) -> Sums:
+        """The sums after a stretch that the force is learnt from alone."""
+        return replace(self, taken=beside(one, self.taken)[2])
+
     def added(self, one: Judged) -> tuple[Sums, Array, Array]:
         """The sums with one more stretch; and its scores (n, m) and information (n, m, m)."""
         score, information, taken = beside(one, self.taken)
@@ -224,6 +228,10 @@ class State:
     # shoal_s, shoalest: that left out for water shallower than in the reference [s], and draught over depth there
     shoal_s: float = 0.0
     shoalest: float = 0.0
+    # wind_s, windiest_mps: that left out for wind unlike the reference's [s], and the largest mean speed of the air
+    # past the ship there [m/s]
+    wind_s: float = 0.0
+    windiest_mps: float = 0.0
     undecided_s: float = 0.0  # how long the largest sum has been above the threshold and too short to be judged [s]
     # brief, by_weather: how often such a sum fell again, and how often weather explained one that was judged
     brief: int = 0
@@ -232,8 +240,8 @@ class State:
     @classmethod
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:
         """The state at the beginning of a watch."""
-        m, known = len(calibration.baseline), Known.nothing(calibration.nuisance)
-        rough, rougher = Known.nothing(calibration.others), np.zeros(len(calibration.seas.variance))
+        m, known = len(calibration.baseline), calibration.begun(calibration.nuisance)
+        rough, rougher = calibration.begun(calibration.others), np.zeros(len(calibration.seas.variance))
         return cls(
             until_s=time_s,
             known=known,
