@@ -199,11 +199,7 @@ def with_unstated(
 
 
 def _output_error_of(vessel: Vessel, options: EstimateOptions, found: Assessment) -> Trial | None:
-    """Output error of an assessment, the chosen one first; else one made in the same weather, if data are not too long.
-
-    Raises:
-        InputError, NoAnswer: there is no such estimate.
-    """
+    """Output error of an assessment, the chosen one first; else one made in the same weather, of data not too long."""
     item = next((item for item in (found.best, *found.methods) if item.method.solver == "oe"), None)
     if item is not None:
         return Trial(method=item.method, horizon_s=item.horizon_s, found=item.estimate, start=item.start)

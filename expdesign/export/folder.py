@@ -118,11 +118,7 @@ def gaps(paths: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _write(folder: Path, files: Mapping[str, str | bytes | Path]) -> None:
-    """Write all files, or none.
-
-    Raises:
-        FileError: the folder or a file cannot be written.
-    """
+    """Write all files, or none."""
     mark = f"{os.getpid()}-{uuid.uuid4().hex[:12]}"
     slots = [_slot(folder, name, mark) for name in files]
     contents = [content.encode() if isinstance(content, str) else content for content in files.values()]

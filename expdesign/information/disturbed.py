@@ -217,9 +217,6 @@ def _measured(vessel: Vessel, primitives: Sequence[Primitive], environment: Envi
     """Noise-free runs of every primitive on every heading, in this order, as they would be measured.
 
     Runs of one length are simulated together. Inputs are what the actuators deliver.
-
-    Raises:
-        Diverged: the nominal model is unstable.
     """
     headings = 2 * np.pi * np.arange(HEADINGS) / HEADINGS
     current_b = np.stack(to_body(environment.current_to, headings, NUMPY), axis=1)

@@ -143,12 +143,7 @@ def _rounded_down(length_m: float) -> float:
 def _places_and_fit(
     track: PlannedTrack, groups: list[Stop], water: shapely.MultiPolygon | None
 ) -> tuple[Array, RouteFit]:
-    """Waypoints as written [deg], and how well the legs between them fit the track.
-
-    Raises:
-        InputError: all are one place.
-        NoPlan: the legs leave the water once rounded.
-    """
+    """Waypoints as written [deg], and how well the legs between them fit the track."""
     places = _written_places(track, groups)
     if len(groups) < 2:
         raise InputError(f"the route has {len(groups)} distinct waypoints, expected 2 or more")

@@ -143,11 +143,7 @@ class _Numbers:
 
 
 def _in_units(path: Path, source: Source, values: Array) -> Array:
-    """A column in SI units.
-
-    Raises:
-        FileError: a value is infinite, or larger than any measurement.
-    """
+    """A column in SI units."""
     huge = np.abs(values) > LARGEST_NUMBER
     if huge.any():
         rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)

@@ -240,9 +240,6 @@ def _force_corners(actuators: Sequence[Actuator]) -> Array:
     """(f, 3) corners of a polytope that holds the generalised forces of all inputs within limits.
 
     The forces of an azimuth lie in a disc, which a regular polygon holds.
-
-    Raises:
-        InputError: an actuator that drives has no limits.
     """
     azimuths = sum(actuator.kind == "azimuth" for actuator in actuators)
     sides = max(FEWEST_SIDES, MOST_SIDES // max(azimuths, 1))

@@ -207,11 +207,7 @@ def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Deci
 
 
 def _columns(logs: Sequence[Log], mapping: Decisions) -> dict[str, dict[str, Channel]]:
-    """File -> column -> channel in the column's unit.
-
-    Raises:
-        NothingToWrite: no channel is used.
-    """
+    """File -> column -> channel in the column's unit."""
     table = {(channel.source, channel.name): channel for log in logs for channel in log.channels}
     found: dict[str, dict[str, Channel]] = {log.source: {} for log in logs}
     for use in mapping.uses:
@@ -228,11 +224,7 @@ def _columns(logs: Sequence[Log], mapping: Decisions) -> dict[str, dict[str, Cha
 def _one_time_scale(
     logs: Sequence[Log], columns: Mapping[str, Mapping[str, Channel]], mapping: Decisions, stated: bool
 ) -> tuple[Decisions, dict[str, Channel], list[str]]:
-    """The mapping with clocks, all columns on the most trusted clock, and notes on what was moved.
-
-    Raises:
-        NothingToWrite: nothing tells how a clock stands to the others.
-    """
+    """The mapping with clocks, all columns on the most trusted clock, and notes on what was moved."""
     clocks = {clock.file: clock for clock in mapping.files}
     speeds = [own[name].values for own in columns.values() for name in (SOG, "u_mps") if name in own]
     typical_m = length_of_speed_m(np.concatenate(speeds) if speeds else np.zeros(0))

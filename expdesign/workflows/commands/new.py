@@ -197,11 +197,7 @@ def _scaled(text: str, factors: Mapping[str, float]) -> str:
 
 
 def _sailable(dictionary: str, vessel: Vessel) -> tuple[str, tuple[str, ...]]:
-    """A dictionary file without the candidates that a vessel cannot sail, and a note on each.
-
-    Raises:
-        InputError: she can sail none.
-    """
+    """A dictionary file without the candidates that a vessel cannot sail, and a note on each."""
     head, *blocks = dictionary.split(BLOCK)
     kept, notes = [], []
     for block in blocks:

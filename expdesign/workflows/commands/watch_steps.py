@@ -185,11 +185,7 @@ class _Columns:
 
 
 def _check_learnt(state: State, setup: Setup) -> None:
-    """Raise where the data gave nothing.
-
-    Raises:
-        NotInformative: the noise was not learnt, or no step of the list was begun.
-    """
+    """Raise where the data gave nothing."""
     steps = setup.steps
     if state.tests is None:
         raise NotInformative(

@@ -101,9 +101,6 @@ def _first_day(
     """The trial of a ship with a wide prior: as asked for where that is verified, or else a first one of shorter runs.
 
     Where neither is verified, a first trial of ships that differ half as much is tried, and what came of it is told.
-
-    Raises:
-        NoAnswer: there is no plan of a first trial.
     """
     trying, first, advising = in_phases(progress, 0.4, 0.5, 0.1)
     whole = whole_trial(plan_problem(case, information, design, seed=seed), trying)
@@ -121,11 +118,7 @@ def _first_day(
 
 
 def _calibrated(case: Scenario, stated: VesselModel | None, seed: int, progress: Progress) -> Day:
-    """The first trial of a ship with a wide prior.
-
-    Raises:
-        NoAnswer: there is none.
-    """
+    """The first trial of a ship with a wide prior."""
     progress("cutting runs to what is safe for all ships of the prior", 0.0)
     first = calibration(case, seed=seed)
     told = scored(first)
@@ -199,11 +192,7 @@ def _shortest_of(
     shared: tuple[Scenario, tuple[PrimitiveInformation, ...], DurationDesign, Accuracy, VesselModel | None, int],
     progress: Progress,
 ) -> Day:
-    """The day of several searches whose drawn trials end soonest, by their median; that of the first of equal ones.
-
-    Raises:
-        NoAnswer: no search has an answer; what the first says.
-    """
+    """The day of several searches whose drawn trials end soonest, by their median; that of the first of equal ones."""
     begin()
     with reported_together(progress, starts) as together:
         tasks = list(enumerate(together.reporters))

@@ -135,11 +135,7 @@ def duration_problem(
 
 
 def _check_excitation(case: Scenario, information: Sequence[PrimitiveInformation], parameters: tuple[str, ...]) -> None:
-    """Refuse samples that do not inform about every parameter, by the manoeuvres that lack the condition.
-
-    Raises:
-        NotInformative: they do not.
-    """
+    """Refuse samples that do not inform about every parameter, by the manoeuvres that lack the condition."""
     settings = case.design
     allowed = [item for item in information if item.primitive.name not in settings.limits.excluded]
     try:
@@ -256,11 +252,7 @@ def _prior(case: Scenario, parameters: tuple[str, ...], stated: VesselModel, *, 
 def _least_information(
     case: Scenario, primitives: Sequence[Primitive], *, seed: int = 0, progress: Progress = silent
 ) -> tuple[InformationFloor, ...]:
-    """What design.reveal and design.tell_apart ask of the durations.
-
-    Raises:
-        NoAnswer: records of a trial cannot show a cause.
-    """
+    """What design.reveal and design.tell_apart ask of the durations."""
     run_s = np.array([item.duration_s for item in primitives])
     return tuple(
         InformationFloor(

@@ -273,11 +273,7 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
 
 
 def _left_of_day(asked: AccuracySettings, sailed_s: float) -> AccuracySettings:
-    """What is asked of the day, its lengths less the time sailed.
-
-    Raises:
-        InputError: no time is left.
-    """
+    """What is asked of the day, its lengths less the time sailed."""
     lengths = {"design.day_s": asked.day_s, "design.accuracy.most_s": asked.most_s}
     for key, length_s in lengths.items():
         if length_s is not None and length_s <= sailed_s:
