@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import InputError, UnknownName
-from expdesign.values import Array, seal
+from expdesign.values import Array, seal, sealed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,7 +49,7 @@ of the origin without gravity, dv/dt + u r, the force and moment of all actuator
 accelerometer along the starboard axis, with gravity in it."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(pose="k 3", velocity="k 3", auxiliary="k 8")
 class Trajectory:
     """Motion sampled at the ends of every command: one sample more than there are commands."""
 
@@ -58,9 +58,6 @@ class Trajectory:
     velocity: Array  # (k, 3) b-frame [u m/s, v m/s, r rad/s], over ground
     # (k, 8) of `AUXILIARY`, nan in columns that the simulation does not give; None where it gives none
     auxiliary: Array | None = None
-
-    def __post_init__(self) -> None:
-        seal(self, pose="k 3", velocity="k 3", **({} if self.auxiliary is None else {"auxiliary": "k 8"}))
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -152,11 +149,10 @@ class Batch:
     auxiliary: Array | None = None  # (k, 8) of `AUXILIARY`, as measured, nan where a column is not; None where none is
 
     def __post_init__(self) -> None:
-        shapes = {
-            "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
-            "steered": "k", "planned": "k p", "auxiliary": "k 8",
-        }  # fmt: skip
-        seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
+        seal(
+            self, inputs="k m", velocity="k 3", pose="k 3", wind="k 2", depth_m="k", interpolated="k 3", steered="k",
+            planned="k p", auxiliary="k 8",
+        )  # fmt: skip
         if self.inputs.shape[1] != len(self.input_names):
             raise InputError(f"Batch has {self.inputs.shape[1]} input columns for the names {self.input_names}")
 

@@ -48,7 +48,7 @@ def _is_sealed(values: object) -> bool:
 
 
 def seal(value: object, **shapes: str) -> None:
-    """Replace the named fields by read-only float arrays and check their shapes.
+    """Replace the named fields by read-only float arrays and check their shapes; those that are None stay it.
 
     Args:
         value: a frozen dataclass instance, in its `__post_init__`.
@@ -60,6 +60,8 @@ def seal(value: object, **shapes: str) -> None:
     """
     sizes: dict[str, int] = {}
     for name, letters in shapes.items():
+        if getattr(value, name) is None:
+            continue
         array = readonly(getattr(value, name))
         expected = letters.split()
         if len(expected) != array.ndim or not all(

@@ -15,7 +15,7 @@ from expdesign.estimation.regression import Integers, build_layout, build_regres
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled, instrument_wind, simulate_batch
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Batch, Record, fit_percent
-from expdesign.values import Array, frozen_set, seal
+from expdesign.values import Array, frozen_set, seal, sealed
 from expdesign.vessel import VesselModel
 
 AHEAD_S = 30.0  # prediction horizon from measured states [s]
@@ -28,7 +28,7 @@ CANCELLING_SHARE = 1.1
 ESTIMATION, TEST = "estimation", "test"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(fit_percent="n", rmse="n", simulated="k 3")
 class RunCheck:
     """The simulation of one run and its errors."""
 
@@ -40,9 +40,6 @@ class RunCheck:
     rmse: Array  # (n,) root-mean-square error [m/s, rad/s], nan likewise
     simulated: Array | None  # (k, 3) u, v, r; None when the simulation diverges
     problem: str  # why there is no simulation, or ""
-
-    def __post_init__(self) -> None:
-        seal(self, fit_percent="n", rmse="n", **({} if self.simulated is None else {"simulated": "k 3"}))
 
 
 EULER = Integration()
@@ -92,7 +89,7 @@ def _simulated(model: VesselModel, batch: Batch, *, wind: bool, integration: Int
 # motion.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@sealed(constant="n", slow="n", quick="n", parameters="n", ceiling_percent="n", ahead_rms="n", ahead_share="n")
 class Limits:
     """The decomposed misfit of one run."""
 
@@ -109,10 +106,6 @@ class Limits:
     ahead_share: Array  # (n,) the same over the standard deviation of the measured output
     growth: float  # how many times an error of the first velocity is larger at the end of the run, at worst
     duration_s: float  # of the run
-
-    def __post_init__(self) -> None:
-        names = ("constant", "slow", "quick", "parameters", "ceiling_percent", "ahead_rms", "ahead_share")
-        seal(self, **dict.fromkeys(names, "n"))
 
     @property
     def unstable(self) -> bool:

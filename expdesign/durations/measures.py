@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -92,13 +92,21 @@ def gram(parts: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class LogDet:
-    """-log det V: D for all parameters, D_s for some of them."""
+class _OfColumns:
+    """Of the covariance V of combinations L (d, k) of the parameters."""
 
     L: Array
 
     def __post_init__(self) -> None:
         seal(self, L="d k")
+
+    def transformed(self, T: Array) -> Self:
+        """As `Measure`."""
+        return replace(self, L=T @ self.L)
+
+
+class LogDet(_OfColumns):
+    """-log det V: D for all parameters, D_s for some of them."""
 
     @property
     def degree(self) -> int:
@@ -135,19 +143,9 @@ class LogDet:
         sign, value = np.linalg.slogdet(self.L.T @ G @ self.L)
         return self.degree + float(value) if sign > 0 else -np.inf
 
-    def transformed(self, T: Array) -> LogDet:
-        """As `Measure`."""
-        return replace(self, L=T @ self.L)
 
-
-@dataclass(frozen=True, eq=False)
-class LogTrace:
+class LogTrace(_OfColumns):
     """-log trace V: A for scaled parameters, V for outcomes."""
-
-    L: Array
-
-    def __post_init__(self) -> None:
-        seal(self, L="d k")
 
     @property
     def degree(self) -> int:
@@ -181,19 +179,9 @@ class LogTrace:
         size = float(np.linalg.svd(half, compute_uv=False).sum())
         return 1.0 + 2.0 * float(np.log(size)) if size > 0 else -np.inf
 
-    def transformed(self, T: Array) -> LogTrace:
-        """As `Measure`."""
-        return replace(self, L=T @ self.L)
 
-
-@dataclass(frozen=True, eq=False)
-class LogSmallest:
+class LogSmallest(_OfColumns):
     """-log of the largest eigenvalue of V: E. It is not differentiable where eigenvalues meet."""
-
-    L: Array
-
-    def __post_init__(self) -> None:
-        seal(self, L="d k")
 
     @property
     def degree(self) -> int:
@@ -214,7 +202,3 @@ class LogSmallest:
         """As `Measure`: 1 + log trace(L^T G L)."""
         size = float(np.sum(self.L * (G @ self.L)))
         return 1.0 + float(np.log(size)) if size > 0 else -np.inf
-
-    def transformed(self, T: Array) -> LogSmallest:
-        """As `Measure`."""
-        return replace(self, L=T @ self.L)

@@ -45,7 +45,7 @@ class Regression:
     strata: Integers | None = None
 
     def __post_init__(self) -> None:
-        seal(self, Phi="k n p", y="k n")
+        seal(self, Phi="k n p", y="k n", heading="k")
         k, n, p = self.Phi.shape
         if len(self.parameters) != p:
             raise InputError(f"Regression has {p} columns for {len(self.parameters)} parameter names")
@@ -57,10 +57,8 @@ class Regression:
         step = _count(batch) if self.step is None else np.array(self.step, dtype=np.int64)
         if step.shape != (k,) or ((np.diff(step) <= 0) & (np.diff(batch) == 0)).any():
             raise InputError(f"Regression.step needs {k} sample numbers that rise within every batch")
-        if self.heading is not None:
-            seal(self, heading="k", Phi="k n p")
-            if not np.isfinite(self.heading).all():
-                raise InputError("Regression.heading holds numbers that are not finite; give none")
+        if self.heading is not None and not np.isfinite(self.heading).all():
+            raise InputError("Regression.heading holds numbers that are not finite; give none")
         if self.strata is not None and self.strata.shape != (k, n):
             raise InputError(f"Regression.strata has shape {self.strata.shape}, expected {(k, n)}")
         frozen_set(self, "batch", batch)
