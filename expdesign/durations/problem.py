@@ -155,7 +155,7 @@ def build_durations(
         total_s: total time of all primitives [s].
         mean_subtraction: "none", "batch" or "complete".
         aim: criterion with its settings; D when not given.
-        prior: (d, d) prior information, per sample of the total time; see `prior_information`.
+        prior: (d, d) prior information, per sample of the total time; see `information.prior`.
         sampled: the information by each model drawn from the prior of the nominal parameters.
         robust: one of `ROBUST`.
         equations: of each parameter; only needed for `constraints.balance`.

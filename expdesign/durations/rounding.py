@@ -18,7 +18,7 @@ from expdesign.values import Array
 ADDED_SHARE = 1e-6  # share of the optimal design added to every set of runs, so that singular ones compare
 LEAST_GAIN = 1e-9  # gains of an exchange below this are rounding
 EQUAL_SHARE = 1e-9  # share of equal times added where the optimal design itself is nearly singular
-LEAST_GAIN_NEARLY_SINGULAR = 1e-6  # `least_gain` there
+LEAST_GAIN_NEARLY_SINGULAR = 1e-6  # `LEAST_GAIN` there
 NAMED_PAIRS = 3  # pairs of merged regressors that a note names
 INSERTIONS = 200  # primitives, best gain per second first, tried in an exchange of one run for several
 Indices = NDArray[np.intp]

@@ -52,7 +52,7 @@ class Settings:
     # what becomes of samples marked as steered: "use", "leave-out", "planned" for instruments from the inputs as
     # planned, or "auto", see `replay.treatment_of`
     steered: str = "auto"
-    samples: str = ALL  # "all", or "equation-wise", see `equation_wise`; output error uses all
+    samples: str = ALL  # "all", or "equation-wise", see `estimation.excitation`; output error uses all
     # what signals inside a modulus must exceed in equation-wise samples
     worst: WorstCase = field(default_factory=WorstCase)
     times: tuple[ActuatorTime, ...] = ()  # dead times and lags that output error estimates beside the parameters

@@ -20,8 +20,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
 from expdesign.vessel.vessel import swept_area
 
-# largest error of the condensed orders, as a share of the range of each signal; larger where `most_order_rows` is
-# reached
+# largest error of the condensed orders, as a share of the range of each signal; larger at `MOST_ORDER_ROWS`
 ORDER_TOLERANCE = 0.02
 MOST_ORDER_ROWS = 48  # rows of orders on one sheet
 CALLED_ORDER_S = 10.0  # mean time between orders below which they are too fast to be called out [s]

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from expdesign import __version__
 from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Figure, Listing, Table, filled, section
-from expdesign.export.files import finite, strict_json, toml_comments, toml_table, toml_value
+from expdesign.export.files import entry, finite, strict_json, toml_comments, toml_table, toml_value
 from expdesign.export.pages.figures import GREY, LINES, light_grid, new_figure, page_figure, svg
 from expdesign.export.words import counted
 from expdesign.importing import Followed, Log, Run, Sampled, inputs_of
@@ -176,15 +176,8 @@ def import_json(content: ImportContent) -> str:
                 {"name": log.source, "clock": log.clock, "channels": len(log.channels), "unused": list(log.unused)}
                 for log in content.logs
             ],
-            "clocks": [
-                {"file": one.file, "offset_s": one.offset_s, "offset_std_s": one.offset_std_s}
-                for one in content.mapping.files
-            ],
-            "channels": [
-                {"file": use.file, "channel": use.channel, "column": use.column or None, "unit": use.unit,
-                 "scale": use.scale, "offset": use.offset, "why": use.why}
-                for use in content.mapping.uses
-            ],
+            "clocks": [entry(one, "file", "offset_s", "offset_std_s") for one in content.mapping.files],
+            "channels": [{**vars(use), "column": use.column or None} for use in content.mapping.uses],
             "runs": [
                 {"file": name, "what": run.family, "begins_s": float(run.stretch.time_s[0]) - content.origin_s,
                  "lasts_s": len(run.stretch) * content.sampled.sample_time_s, "approach_s": run.approach_s}

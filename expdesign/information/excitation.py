@@ -11,7 +11,7 @@ manoeuvring model, surge has |u|, sway and yaw have |v|. A design counts by choi
   `LEAST_CLEAR` of the run; heading by heading. Manoeuvres begin straight, so an offset takes time to build up.
 
 On either side of zero the mean of a square's noise has another sign, so samples of each side are a stratum with a mean
-of its own, as in `estimation.equation_wise`.
+of its own, as in `estimation.excitation`.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, 5.6, assumptions A5 and A7, (5.8), (5.72).
 """

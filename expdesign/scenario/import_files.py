@@ -191,17 +191,8 @@ def load_mapping(path: Path | str) -> Mapping:
         given[use.column] = number
     return Mapping(
         uses=tuple(uses),
-        files=tuple(
-            FileClock(
-                file=one.name, offset_s=one.offset_s, offset_std_s=one.offset_std_s, sample_time_s=one.sample_time_s
-            )
-            for one in file.file
-        ),
-        sample_time_s=file.sample_time_s,
-        variation_deg=file.variation_deg,
-        antenna_forward_m=file.antenna_forward_m,
-        antenna_starboard_m=file.antenna_starboard_m,
-        length_m=file.length_m,
+        files=tuple(FileClock(file=one.name, **one.model_dump(exclude={"name"})) for one in file.file),
+        **file.model_dump(exclude={"file", "channel"}),
     )
 
 
@@ -222,7 +213,4 @@ def _use(table: ChannelTable, entry: Entry) -> Use:
     shares = SHARES if is_input(re.sub("^(reached|planned)_", "", column)) or column.startswith("tau") else {}
     if column and table.unit and table.unit not in dims and table.unit not in shares:
         raise entry.at("unit").unknown(table.unit, [unit for unit in (*dims, *shares) if unit])
-    return Use(
-        file=table.file, channel=table.channel, column=column, unit=table.unit, scale=table.scale, offset=table.offset,
-        why=table.why,
-    )  # fmt: skip
+    return Use(**table.model_dump())

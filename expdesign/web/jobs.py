@@ -10,7 +10,6 @@ import re
 import shlex
 import signal
 import sys
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -33,7 +32,6 @@ class Job:
     lines: list[str] = field(default_factory=list)  # printed
     errors: list[str] = field(default_factory=list)  # lines on what is wrong or stands in the way
     status: int | None = None  # exit status; None before the end
-    began_s: float = field(default_factory=time.monotonic)
     process: asyncio.subprocess.Process | None = None
     stopped: bool = False  # by the user
 
@@ -96,7 +94,7 @@ class Jobs:
         async with self._turns:
             if job.status is not None:
                 return
-            job.began_s, job.activity = time.monotonic(), "starting"
+            job.activity = "starting"
             job.process = await asyncio.create_subprocess_exec(
                 *(sys.executable, "-m", *shlex.split(job.command)),
                 cwd=self.folder,

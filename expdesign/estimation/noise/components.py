@@ -86,11 +86,7 @@ class Timeline:
 
     def spread(self, rows: Array) -> Array:
         """(t, ...) from (k, ...), zero where a sample was left out."""
-        if len(rows) == len(self.batch):
-            return rows
-        result = np.zeros((len(self.batch), *rows.shape[1:]))
-        result[self.place] = rows
-        return result
+        return rows if len(rows) == len(self.batch) else spread(rows, self.place)
 
 
 def timeline(batch: Integers, step: Integers) -> Timeline:
@@ -105,8 +101,6 @@ def timeline(batch: Integers, step: Integers) -> Timeline:
 
 
 # Parts that noise may consist of: white, of the sensors, and slow ones, with their covariances in time.
-#
-# The formula and its sources stand in `components`.
 
 WHITE, SENSOR = 0, 1  # places of the quick parts among the variances; slow ones follow
 MEMORIES = 2.0 ** np.arange(1, 11)

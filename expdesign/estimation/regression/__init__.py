@@ -15,7 +15,6 @@ from expdesign.estimation.regression.nuisance import (
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
 from expdesign.estimation.regression.predictors import (
     CURRENT,
-    NOTHING,
     PREDICTORS,
     STEADY,
     UNKNOWN,

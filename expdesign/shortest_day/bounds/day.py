@@ -34,7 +34,7 @@ SLOW_START = 0.01  # share of the way's time that gaining speed must take for th
 # first.
 #
 # Source: F. Clarke, Functional Analysis, Calculus of Variations and Optimal Control (2013), for the comparison;
-# combined here with `affine`.
+# combined here with affine arithmetic.
 
 
 @sealed(edges="n", gain="k", loss="k")
