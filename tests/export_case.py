@@ -23,7 +23,16 @@ from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, simulate
-from expdesign.vessel import Actuator, Limit, Response, Vessel, VesselModel, allocate, required_force, structure_terms
+from expdesign.vessel import (
+    Actuator,
+    Limit,
+    Response,
+    Vessel,
+    VesselModel,
+    commands_for,
+    required_push,
+    structure_terms,
+)
 
 PARAMETERS = (-0.05, -0.05, 1.0, 0.02, -0.2, -0.65, 0.02, -0.1, -0.0015, 0.0003)
 CLEARANCE_M = 20.0
@@ -138,8 +147,8 @@ def _joint(
     wished[:, 2] += turn / seconds * (1 - np.cos(2 * np.pi * share[:, 0]))
     wished[:, 1] += -3.0 * wished[:, 0] * (wished[:, 2] - start[2] * (1 - blend[:, 0]) - end[2] * blend[:, 0])
     middles, rates = (wished[1:] + wished[:-1]) / 2, np.diff(wished, axis=0)
-    force = np.array([required_force(vessel.model, nu, rate) for nu, rate in zip(middles, rates, strict=True)])
-    return np.asarray(allocate(vessel.actuators, force, sample_time_s=1.0, before=before))
+    force = np.array([required_push(vessel.model, nu, rate) for nu, rate in zip(middles, rates, strict=True)])
+    return np.asarray(commands_for(vessel.model, force, sample_time_s=1.0, before=before))
 
 
 def _area(trajectory: Trajectory) -> SeaArea:

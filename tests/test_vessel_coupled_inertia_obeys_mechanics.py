@@ -21,7 +21,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.simulation.run import simulate_many
-from expdesign.vessel import Inertia, Term, Vessel, VesselModel, required_force
+from expdesign.vessel import Inertia, Term, Vessel, VesselModel, required_push
 
 MASS, TURNING, AHEAD = 4e5, 6e7, 3.5  # of a body; its moment of inertia about its centre of gravity, x_g
 SAMPLE_S = 0.5
@@ -103,7 +103,7 @@ def test_every_simulation_and_the_inverse_follow_it() -> None:
     np.testing.assert_allclose(states[0], sailed, atol=1e-9)
     assert np.abs(simulate(barge, held, velocity=(1.5, 0.1, 0.02)).velocity[:-1] - sailed).max() > 1e-3
     velocity, wanted = np.array([2.0, 0.2, 0.03]), np.array([0.02, -0.03, 0.004])
-    force = required_force(ship.model, velocity, wanted)
+    force = required_push(ship.model, velocity, wanted)
     np.testing.assert_allclose(ship.model.accelerations(velocity, velocity[:2], force), wanted, atol=1e-12)
 
 

@@ -14,13 +14,11 @@ from expdesign.vessel.actuators import (
 )
 from expdesign.vessel.inverse import (
     Allocator,
-    allocate,
     by_force,
     commands_for,
     direct_terms,
     force_matrix,
     pushed_everywhere,
-    required_force,
     required_push,
     within_limits,
 )

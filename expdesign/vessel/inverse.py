@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
-from expdesign.errors import InputError
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.model import VesselModel
@@ -27,7 +25,7 @@ def required_push(
     near: Array | None = None,
     tolerance: float = 1e-4,
 ) -> Array:
-    """What gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air, for `allocate`.
+    """What gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air, for `commands_for`.
 
     The generalised force (..., 3) where the model is affine in it, the thrusts of all actuators (..., c) elsewhere.
     Directions that it cannot push (no equation, no gain) get the least-squares answer.
@@ -40,37 +38,25 @@ def required_push(
     """
     if not by_force(model):
         return required_thrust(model, velocity, acceleration, sway=sway, near=near, tolerance=tolerance)
-    return required_force(model, velocity, acceleration)
-
-
-def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> Array:
-    """Generalised force (..., 3) that gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air.
-
-    Directions that the model cannot push (no equation, no gain) get the least-squares answer.
-
-    Raises:
-        InputError: the model is not `by_force`.
-    """
-    if not by_force(model):
-        read = direct_terms(model) or ("the model is not affine in them",)
-        raise InputError(f"term {read[0]}: no {', '.join(FORCE_SIGNALS)} alone gives a motion")
     if model.inertia is not None:
         sway, yaw = model.inertia.uncoupled(acceleration[..., 1], acceleration[..., 2])
         acceleration = np.stack(np.broadcast_arrays(acceleration[..., 0], sway, yaw), axis=-1)
+    still = _rates(model, velocity, np.zeros(3))
+    if _same_push_at_any_speed(model):  # one small inverse instead of one for every velocity
+        return np.asarray((acceleration - still) @ _inverse_at_rest(model).T, dtype=float)
+    gain = np.stack([_rates(model, velocity, unit) - still for unit in np.eye(3)], axis=-1)  # (..., outputs, forces)
+    return np.asarray((np.linalg.pinv(gain) @ (acceleration - still)[..., None])[..., 0], dtype=float)
+
+
+def _rates(model: VesselModel, velocity: Array, force: Array) -> Array:
+    """d/dt (u, v, r) (..., 3) at a velocity (..., 3) by a generalised force (3,), without coupled inertia."""
     motion = {name: velocity[..., column] for column, name in enumerate(OUTPUTS)}
     signals = motion | {"u_q": motion["u"], "v_q": motion["v"], SHOAL: 0.0}
-
-    def response(force: Iterable[float]) -> Array:
-        table, totals = signals | dict(zip(FORCE_SIGNALS, force, strict=True)), np.zeros((3, *velocity.shape[:-1]))
-        for term, expression, value in _acting(model):
-            totals[OUTPUTS.index(term.equation)] += value * expression.evaluate(table, NUMPY)
-        return _columns(totals / model.time_scale_s)
-
-    free = response((0.0, 0.0, 0.0))
-    if _same_push_at_any_speed(model):  # one small inverse instead of one for every velocity
-        return np.asarray((acceleration - free) @ _inverse_at_rest(model).T, dtype=float)
-    gain = np.stack([response(unit) - free for unit in np.eye(3)], axis=-1)  # (..., 3 outputs, 3 forces)
-    return np.asarray((np.linalg.pinv(gain) @ (acceleration - free)[..., None])[..., 0], dtype=float)
+    signals |= dict(zip(FORCE_SIGNALS, force.tolist(), strict=True))
+    totals = np.zeros((3, *velocity.shape[:-1]))
+    for term, expression, value in _acting(model):
+        totals[OUTPUTS.index(term.equation)] += value * expression.evaluate(signals, NUMPY)
+    return _columns(totals / model.time_scale_s)
 
 
 def _columns(rows: Array) -> Array:
@@ -95,21 +81,8 @@ def _acting(model: VesselModel) -> tuple[tuple[Term, Expression, float], ...]:
 @lru_cache(maxsize=16)
 def _inverse_at_rest(model: VesselModel) -> Array:
     """(3, 3) force for unit accelerations of (u, v, r) at rest."""
-    return readonly(np.linalg.pinv(_push_at_rest(model)))
-
-
-def _push_at_rest(model: VesselModel) -> Array:
-    """(3, 3) acceleration of (u, v, r) for unit forces at rest."""
-    rest = dict.fromkeys((*MOTION_SIGNALS, *FORCE_SIGNALS, SHOAL), 0.0)
-
-    def response(force: Array) -> Array:
-        table = rest | dict(zip(FORCE_SIGNALS, force.tolist(), strict=True))
-        totals = dict.fromkeys(("u", "v", "r"), 0.0)
-        for term, expression, value in _acting(model):
-            totals[term.equation] += float(value * expression.evaluate(table, NUMPY))
-        return np.array(list(totals.values())) / model.time_scale_s
-
-    return np.stack([response(unit) - response(np.zeros(3)) for unit in np.eye(3)], axis=-1)
+    still = _rates(model, np.zeros(3), np.zeros(3))
+    return readonly(np.linalg.pinv(np.stack([_rates(model, np.zeros(3), unit) - still for unit in np.eye(3)], axis=-1)))
 
 
 @lru_cache(maxsize=16)
@@ -172,30 +145,6 @@ def _inverse_force_matrix(actuators: tuple[Actuator, ...]) -> Array:
     return readonly(np.linalg.pinv(force_matrix(actuators)))
 
 
-def allocate(
-    actuators: tuple[Actuator, ...],
-    force: Array,
-    *,
-    sample_time_s: float,
-    before: Array | None = None,
-    near: Array | None = None,
-) -> Array:
-    """Commands (..., k, m) for desired generalised forces (..., k, 3): smallest thrusts, then limits and rates.
-
-    An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
-    it keeps its angle. A saturated thruster is not relieved by the others. Rudders stay amidships.
-
-    Args:
-        actuators: in command order.
-        force: (..., k, 3) tau_x, tau_y, tau_psi.
-        sample_time_s: time between rows [s].
-        before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
-        near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
-    """
-    desired = force @ _inverse_force_matrix(actuators).T  # (..., k, c)
-    return _row_by_row(actuators, desired, _bounds(actuators, sample_time_s), before, near)
-
-
 def commands_for(
     model: VesselModel,
     push: Array,
@@ -204,19 +153,18 @@ def commands_for(
     before: Array | None = None,
     near: Array | None = None,
 ) -> Array:
-    """Commands (..., k, m) for what `required_push` gives (..., k, 3 or c), as of `allocate`."""
+    """Commands (..., k, m) for what `required_push` gives (..., k, 3 or c): smallest thrusts, then limits and rates.
+
+    An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
+    it keeps its angle. A saturated thruster is not relieved by the others. Rudders stay amidships.
+
+    Args:
+        sample_time_s: time between rows [s].
+        before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
+        near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
+    """
     desired, actuators = _thrusts(model, push)
-    return _row_by_row(actuators, desired, _bounds(model.actuators, sample_time_s), before, near)
-
-
-def _row_by_row(
-    actuators: tuple[Actuator, ...],
-    desired: Array,
-    bounds: tuple[Array, Array, Array],
-    before: Array | None,
-    near: Array | None,
-) -> Array:
-    """Commands (..., k, m) for thrusts (..., k, c), each row within a sample's change from the one before."""
+    bounds = _bounds(model.actuators, sample_time_s)
     rows, last = [], before
     for row in np.moveaxis(desired, -2, 0):
         last = _reached(bounds, _desired_commands(actuators, row, last if near is None else near), last)
@@ -242,7 +190,7 @@ def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time
 
 
 class Allocator:
-    """`allocate` and `within_limits` for n ships at once, sample by sample."""
+    """`commands_for` and `within_limits` for n ships at once, sample by sample."""
 
     def __init__(self, model: VesselModel, *, sample_time_s: float) -> None:
         """Prepare the allocation to a model's actuators, in command order."""
