@@ -166,19 +166,21 @@ def select_causes(
     reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
     dropped = {step.chosen.candidate.cause for step in found.steps} if not kept.steps else set()
     little = explains_little(reached, windows) or any(step.chosen.candidate.imitates for step in kept.steps)
-    # other values of many parameters imitate any cause: where these are no finding, any may be
-    asked = set() if little or RE_ESTIMATED in dropped else dropped
+    # other values of many parameters imitate any cause: where these are no finding, any may be, beside the file's
+    imitated = not little and RE_ESTIMATED in dropped
     if dropped or little:
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
-        compared = compare_predictions(begun, short, seed, progress, asked)
-        by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
-        if by_predictions and asked and by_predictions[0].steps[0].chosen.candidate.cause not in asked:
+        by_predictions = None
+        if not imitated:
+            compared = compare_predictions(begun, short, seed, progress, () if little else dropped)
+            by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
+        if by_predictions and not little and by_predictions[0].steps[0].chosen.candidate.cause not in dropped:
             by_predictions = None  # where much is explained, predictions confirm what likelihoods found, and no more
-        if compared and little and not by_predictions and not kept.steps and found.first.keys:
+        if (imitated or (compared and little)) and not by_predictions and not kept.steps and found.first.keys:
             stated = compare_predictions(ship.with_known_parameters(), short, seed, progress)
-            apart = validation.of(found.first).on_other_runs
-            rival = compared.without if apart is None else apart()  # by parts of runs they flatter themselves
+            rival = validation.of(found.first).apart()  # by parts of runs they flatter themselves
             by_predictions = stated and found_by_predictions(kept, stated, data, ship, seed, rival)
+            compared = compared or stated
         if compared and kept.steps and not by_predictions:
             kept, compared = with_alternatives(kept, compared, seed), None
         kept, held = by_predictions or (kept, held)

@@ -93,6 +93,10 @@ class HeldOut:
         """Errors of the same model measured as those of another are: of whole units or of short stretches."""
         return self.ahead() if other.in_stretches and self.ahead is not None else self
 
+    def apart(self) -> HeldOut:
+        """Errors in stretches of runs that the model was not fitted to, where there are enough; else in whole units."""
+        return self if self.on_other_runs is None else self.on_other_runs()
+
     @property
     def mean_fit(self) -> float:
         """Over outputs [%]; minus infinity where one has none. Of stretches by the geometric mean over outputs too."""

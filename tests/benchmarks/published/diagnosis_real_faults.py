@@ -35,7 +35,7 @@ CERTAIN = 5.0  # parameters that are so many standard deviations from zero may b
 LEAST_COST = 0.1  # relative growth of some error 30 s ahead by which a term that is taken out must show
 SEEN = 0.05  # p-value of an oracle that sees: six stretches give no less than 0.016
 STD = 2.5  # standard errors within which a size is right
-OF_MODEL = ("delay:all", "offset:rudder", "offset:a")  # effects that a model may lack before a fault
+OF_MODEL = ("delay:all", "lead:all", "offset:rudder", "offset:a")  # effects that a model may lack before a fault
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +82,13 @@ def _ahead(batch: Batch, lead_s: float) -> Batch:
     count = round(lead_s / batch.sample_time_s)
     ahead = np.concatenate([batch.inputs[count:], np.repeat(batch.inputs[-1:], count, axis=0)])
     return replace(batch, inputs=ahead)
+
+
+def _behind(batch: Batch, _rng: np.random.Generator) -> Batch:
+    """Inputs recorded by a clock that is behind: that much later than they act."""
+    count = round(DELAY_S / batch.sample_time_s)
+    behind = np.concatenate([np.repeat(batch.inputs[:1], count, axis=0), batch.inputs[:-count]])
+    return replace(batch, inputs=behind)
 
 
 def _misaligned(batch: Batch, _rng: np.random.Generator) -> Batch:
@@ -256,19 +263,22 @@ def of_model(vessel: Vessel, record: Record, effects: Iterable[str], beside: Map
     A ship needs some angle to sail straight, another one on another day. Least squares make a dead time: their
     differences from sample to sample are those of a ship a little later than she is, or sooner. Less than no dead time
     is no effect, so that it is found beside orders that are made early by `LEAD_S`, which no fault is. A slew rate also
-    makes the ship late: what she lacks beside another one than the file's is another dead time.
+    makes the ship late: what she lacks beside another one than the file's is another dead time. Orders that are late
+    hide one of the same length.
 
     Args:
         beside: effects that the model has instead of those of the file.
     """
     found = {}
-    for key in effects:
+    for effect in effects:
+        key = effect.replace("lead:", "delay:")
         sample_s = record.batches[0].sample_time_s
         lead_s = round(LEAD_S / sample_s) * sample_s if key.startswith("delay:") else 0.0
         data = replace(record, batches=tuple(_ahead(batch, lead_s) for batch in record.batches))
         ship = extended_model(vessel, data).with_effects({**beside, **({key: lead_s} if lead_s else {})})
         windows = stable_windows(ship, data)
-        found[key] = float(fit(ship, windows, (key,), starts=fitted_start(ship, windows)).value(key)) - lead_s
+        own = float(fit(ship, windows, (key,), starts=fitted_start(ship, windows)).value(key)) - lead_s
+        found[effect] = own if effect == key else -own
     return found
 
 
@@ -394,4 +404,5 @@ FAULTS = (
         name="rate of the rudder", model=_slower, causes=("actuator_slew",), needs="rudder",
         record=("rudder1 moves evenly at", np.nan),
     ),
+    Fault(name="orders late 1 s", batch=_behind, causes=("late_orders",), effects=(("lead:all", DELAY_S),)),
 )  # fmt: skip
