@@ -12,8 +12,8 @@ from design_case import example_dictionary, vessel
 from expdesign.estimation.methods import METHODS
 from expdesign.export import estimate_page
 from expdesign.export.document import Table
-from expdesign.export.validation_page import biased, judgements, off_theory, surely_biased
-from expdesign.rehearsal.validation import Rehearsal, Validated, validate
+from expdesign.export.validation_page import DRAWS, biased, informative_s, judgements, off_theory, surely_biased
+from expdesign.rehearsal.validation import Rehearsal, Validated, random_runs, validate
 from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Sensors, Vessel
 
@@ -60,7 +60,7 @@ def told(plan: Rehearsal, *, spread: float, noisy: tuple[str, ...] = ()) -> str:
         parameters=plan.parameters,
         truth=truth,
         estimates=truth + spread * draws,
-        stated=np.ones((400, p)),
+        stated=np.full((400, p), spread),
         forecast=np.ones(p),
         theory=np.ones(p),
         failed=0,
@@ -173,3 +173,36 @@ def test_a_wrong_prediction_is_noticed_by_enough_trials():
     assert len(off_theory(drawn(400, 1, spread=0.6))) == 10
     assert len(biased(drawn(400, 1, bias=1.0))) == 10
     assert len(surely_biased(drawn(400, 1, bias=0.5))) == 10
+
+
+@pytest.mark.parametrize("longer", [1, 2, 3])
+def test_designs_of_other_lengths_are_compared_in_equal_time(longer: int):
+    """Equal shares have at least one run of each manoeuvre, up to half as long again; variances fall as time grows."""
+    plan = rehearsal(designs={"optimised": (1,) * 11, "equal shares": (longer,) * 11})
+    best, other = (
+        replace(one, design=name, truth=np.ones(10), estimates=1.0 + one.estimates)
+        for one, name in ((drawn(400, 1), "optimised"), (drawn(400, 2, spread=longer**-0.5), "equal shares"))
+    )
+    said, *_ = judgements(plan, (best, other), noisy_moduli=())
+    found = re.search(r"in ([0-9.]+) times its time, so about ([0-9.]+) times in equal time", said)
+    assert (found is None) == (longer == 1)
+    if found:
+        assert float(found[1]) == longer
+        assert float(found[2]) == pytest.approx(1.0, abs=0.05)  # 4.5 standard errors of ten parameters in 400 trials
+
+
+def test_random_designs_last_as_long_as_is_told():
+    plan = rehearsal(designs={"random": None}, total_s=400.0, primitives=example_dictionary("standard"))
+    durations_s = np.array([one.duration_s for one in plan.primitives])
+    rng = np.random.default_rng(0)
+    spent = np.array([np.dot(random_runs(plan, rng), durations_s) for _ in range(2000)])
+    told_s = informative_s(plan, replace(drawn(2, 0), design="random"))
+    assert abs(spent.mean() - told_s) <= 4 * spent.std() * np.sqrt(1 / len(spent) + 1 / DRAWS)
+
+
+@pytest.mark.parametrize(("times", "kind"), [(0.6, "narrow"), (1.0, ""), (2.3, "wide")])
+def test_an_estimator_whose_own_errors_are_not_those_observed_is_told(times: float, kind: str):
+    result = replace(drawn(100, 3), stated=np.full((100, 10), times))
+    said = [text for text in judgements(rehearsal(), (result,), noisy_moduli=()) if "that the estimator states" in text]
+    assert len(said) == bool(kind)
+    assert all(f"intervals are too {kind}" in text for text in said)

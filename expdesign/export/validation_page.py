@@ -26,13 +26,15 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.words import significant
-from expdesign.rehearsal import Rehearsal, Validated
+from expdesign.rehearsal import Rehearsal, Validated, random_runs
 from expdesign.values import Array
 
 # largest relative difference of standard deviations that counts as agreement, apart from sampling error
 AGREEING_STD = 0.10
 BIASED = 0.5  # bias over standard deviation beyond which an estimator does not count as consistent
 CHANCE = 0.01  # probability that a bias, or a wrong standard deviation, is reported where there is none
+SAME_TIME = 0.02  # relative difference of informative times up to which designs have the same
+DRAWS = 400  # of random designs, whose mean length is known to a few thousandths by them
 ERROR_LIMIT = 1.5  # normalised error below which the thesis calls a trial good
 
 
@@ -93,17 +95,45 @@ def judgements(rehearsal: Rehearsal, results: Sequence[Validated], *, noisy_modu
     """
     judged = [sentence for item in results for sentence in _judged(item)]
     doubtful = any(biased(item) or off_theory(item) for item in results)
-    return (*_comparison(results), *judged, *(_assumptions(rehearsal, noisy_moduli) if doubtful else ()))
+    return (*_comparison(rehearsal, results), *judged, *(_assumptions(rehearsal, noisy_moduli) if doubtful else ()))
 
 
-def _comparison(results: Sequence[Validated]) -> Iterator[str]:
+def _comparison(rehearsal: Rehearsal, results: Sequence[Validated]) -> Iterator[str]:
+    """Other designs beside the best one; variances fall as the time grows, which differs by rounding to whole runs."""
     best, *others = results
     for other in others:
-        ratio = float(np.exp(np.mean(np.log(other.found / best.found))))
+        ratio = _ratio(other.found, best.found)
+        longer = informative_s(rehearsal, other) / informative_s(rehearsal, best)
+        times = ""
+        if abs(longer - 1.0) > SAME_TIME:
+            times = f" in {longer:.2f} times its time, so about {ratio * np.sqrt(longer):.2f} times in equal time"
         yield (
             f"{other.design.capitalize()}: standard deviations are {ratio:.2f} times (geometric mean) those of the "
-            f"{best.design} design. The median error is {np.median(other.errors):.3g}, that of the {best.design} "
-            f"design {np.median(best.errors):.3g}."
+            f"{best.design} design{times}. The median error is {np.median(other.errors):.3g}, that of the "
+            f"{best.design} design {np.median(best.errors):.3g}."
+        )
+
+
+def informative_s(rehearsal: Rehearsal, result: Validated) -> float:
+    """How long all runs of a design take; of random ones the mean of many draws, the last run of which goes beyond."""
+    runs, rng = rehearsal.designs[result.design], np.random.default_rng(0)
+    counts = [random_runs(rehearsal, rng) for _ in range(DRAWS)] if runs is None else [runs]
+    return float(np.mean(counts, axis=0) @ [one.duration_s for one in rehearsal.primitives])
+
+
+def _ratio(some: Array, others: Array) -> float:
+    return float(np.exp(np.mean(np.log(some / others))))
+
+
+def _stated(result: Validated) -> Iterator[str]:
+    """Whether the estimator's own standard deviations are those that its estimates have."""
+    ratio, (least, most) = _ratio(np.median(result.stated, axis=0), result.found), sampling_error(result)
+    agreeing = 1.0 + AGREEING_STD
+    if not 1.0 / (most * agreeing) < ratio < agreeing / least:
+        kind = "wide" if ratio > 1.0 else "narrow"
+        yield (
+            f"{result.design.capitalize()}: the standard deviations that the estimator states are {ratio:.2g} times "
+            f"(geometric mean) those observed: its 95 % intervals are too {kind}."
         )
 
 
@@ -120,6 +150,7 @@ def _judged(result: Validated) -> Iterator[str]:
             f"{significant(100 * (least - 1), 2)} to +{significant(100 * (most - 1), 2)} % "
             f"({100 * CHANCE:g} % for all parameters together)."
         )
+    yield from _stated(result)
     if off:
         yield f"{result.design.capitalize()}: predicted and observed standard deviations differ for {', '.join(off)}."
     if surely := surely_biased(result):
@@ -220,6 +251,7 @@ def _entry(rehearsal: Rehearsal, result: Validated) -> dict[str, object]:
     runs = rehearsal.designs[result.design]
     names = [primitive.name for primitive in rehearsal.primitives]
     return {
+        "informative_s": informative_s(rehearsal, result),
         "runs": None if runs is None else {name: count for name, count in zip(names, runs, strict=True) if count},
         "failed": result.failed,
         "normalised_error": {
@@ -336,12 +368,21 @@ def validation_document(
 
 
 def _designs(rehearsal: Rehearsal, results: tuple[Validated, ...]) -> Section:
-    header = ("Design", "Runs", "Median error", "95th percentile", f"Error below {ERROR_LIMIT:g}", "No estimate")
+    header = (
+        "Design",
+        "Runs",
+        "Time",
+        "Median error",
+        "95th percentile",
+        f"Error below {ERROR_LIMIT:g}",
+        "No estimate",
+    )
     rows = [_design_row(rehearsal, item) for item in results]
     return section(
         "Designs",
         Table(header=header, rows=rows, texts=2),
-        "All designs have the same informative time, up to the rounding to whole runs. The error of a trial is "
+        "All designs have the informative time that is nearest to the scenario's in whole runs, equal shares at least "
+        "one run of each manoeuvre, random runs what is drawn until it is reached. The error of a trial is "
         "the root mean square over the parameters of (estimate \u2212 truth) / |truth|.",
         Figure(
             draw=partial(error_figure, results),
@@ -380,6 +421,7 @@ def _design_row(rehearsal: Rehearsal, result: Validated) -> tuple[str, ...]:
     return (
         result.design,
         spelled,
+        words.duration(informative_s(rehearsal, result)),
         f"{np.median(result.errors):.3g}",
         f"{np.percentile(result.errors, 95):.3g}",
         f"{100 * (result.errors < ERROR_LIMIT).mean():.1f} %",

@@ -8,6 +8,7 @@ from expdesign.rehearsal.validation import (
     Validated,
     equal_runs,
     estimates_alone,
+    random_runs,
     trial_parts,
     validate,
 )

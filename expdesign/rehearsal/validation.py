@@ -183,13 +183,13 @@ def estimates_of(rehearsal: Rehearsal, design: str, number: int, trials: int) ->
     rng = np.random.default_rng([rehearsal.seed, order, number])
     runs = rehearsal.designs[design]
     if runs is None:
-        records = [_sailed(rehearsal, _random_runs(rehearsal, rng), 1, rng)[0] for _ in range(trials)]
+        records = [_sailed(rehearsal, random_runs(rehearsal, rng), 1, rng)[0] for _ in range(trials)]
     else:
         records = _sailed(rehearsal, runs, trials, rng)
     return np.array([_estimated(rehearsal, record) for record in records])
 
 
-def _random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, ...]:
+def random_runs(rehearsal: Rehearsal, rng: np.random.Generator) -> tuple[int, ...]:
     """Runs drawn one by one until the time is used."""
     counts, spent = [0] * len(rehearsal.primitives), 0.0
     while spent < rehearsal.total_s * (1 - 1e-9):
