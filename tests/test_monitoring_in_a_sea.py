@@ -317,6 +317,14 @@ def test_a_diagnosis_takes_over_what_the_alarm_named(vessel: Vessel, tmp_path: P
     assert [*named] == ["theta:X_uu"]
     assert alarm["in_words"] in named["theta:X_uu"]
     assert with_alarms(vessel, [tmp_path / "other.csv"])[1] == {}
+    for effect, key in (("gyro", "yaw_rate_scale"), ("offset:rudder", "rudder1_offset")):
+        alarm = {"effect": effect, "value": -0.04, "std": 0.03, "in_words": "by so much"}
+        (tmp_path / "monitor.json").write_text(json.dumps({"alarms": [alarm]}))
+        for known, taken in ((0.001, 0.05), (0.2, 0.2)):
+            ship, named = with_alarms(replace(vessel, std={key: known}), [tmp_path / "since-change.csv"])
+            assert ship.std == {key: pytest.approx(taken)}
+            assert (f"deviation of {key} is taken as 0.05" in named[effect]) == (known < taken)
+        assert with_alarms(vessel, [tmp_path / "since-change.csv"])[0].std == {}  # known exactly, or any size is free
     (tmp_path / "monitor.json").write_text(json.dumps({"alarms": [alarm | {"effect": "yaw:I_r"}]}))
     assert with_alarms(vessel, [tmp_path / "since-change.csv"])[1] == {}
 

@@ -44,7 +44,7 @@ def stated_std(vessel: Vessel, inputs: tuple[str, ...], derived: tuple[str, ...]
     found = {}
     for key in stated:
         kind = key.split(":")[0]
-        given = (vessel.std.get(name, 0.0) for name in _file_keys(key, inputs, derived))
+        given = (vessel.std.get(name, 0.0) for name in std_keys_of(key, inputs, derived))
         found[key] = flows[kind] if kind in flows else max(given, default=0.0) * _slope(key, stated[key])
     return {key: std for key, std in found.items() if std > 0 and key.split(":")[0] not in SEARCHED}
 
@@ -54,7 +54,7 @@ def found_std(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float], kno
     named = {
         name: value / _slope(key, ship.get(key))
         for key, value in std.items()
-        for name in _file_keys(key, ship.model.inputs, ship.derived)
+        for name in std_keys_of(key, ship.model.inputs, ship.derived)
     }
     return {name: value for name, value in {**vessel.std, **named}.items() if name in known and value > 0}
 
@@ -77,8 +77,8 @@ def with_std(weather: Environment, std: Mapping[str, float]) -> Environment:
     )
 
 
-def _file_keys(key: str, inputs: tuple[str, ...], derived: tuple[str, ...]) -> tuple[str, ...]:
-    """Keys of `Vessel.std` that an effect belongs to."""
+def std_keys_of(key: str, inputs: tuple[str, ...], derived: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Keys of `Vessel.std` that an effect belongs to; `derived` are velocities that come from the pose."""
     kind, _, rest = key.partition(":")
     if kind in RESPONSES:
         return tuple(f"{inputs[column]}_{RESPONSES[kind]}" for column in group_columns(rest, inputs))

@@ -13,6 +13,7 @@ import numpy as np
 from expdesign import requests
 from expdesign.diagnosis import Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
+from expdesign.diagnosis.vessel_file import std_keys_of
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.estimation.regression import model_for
@@ -72,12 +73,14 @@ def diagnose(request: requests.Diagnose, *, progress: Progress = silent) -> Outc
 
 
 def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, str]]:
-    """The ship with parameters that a watch named as unsure as its alarm says; for files that it left.
+    """The ship with what a watch named as unsure as its alarm says; for files that it left.
 
-    Their standard deviations, of which the fit starts, are the size of the change together with its standard error.
-    Returns also the effects that were named, each with who named it, in words.
+    Stated standard deviations of parameters, actuators and sensors that are smaller become the size of the change
+    together with its standard error: the fit would hold it for unlikely. Returns also the effects that were named, each
+    with who named it, in words.
     """
     names, std, named = ship.model.names, ship.model.parameter_std.copy(), dict[str, str]()
+    stated = dict(ship.std)
     for path in data:
         told = path.with_name("monitor.json")
         if path.name != SINCE_CHANGE or not told.is_file():
@@ -93,7 +96,11 @@ def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, s
         if (name := effect.removeprefix("theta:")) in names and size > std[names.index(name)] > 0.0:
             std[names.index(name)] = size
             named[effect] += f"; the standard deviation of {name} is taken as {size:.3g}"
-    return replace(ship, model=replace(ship.model, parameter_std=std)), named
+        narrow = [key for key in std_keys_of(effect, ship.model.inputs) if size > stated.get(key, 0.0) > 0.0]
+        stated |= dict.fromkeys(narrow, size)
+        if narrow:
+            named[effect] += f"; the standard deviation of {', '.join(narrow)} is taken as {size:.3g}"
+    return replace(ship, model=replace(ship.model, parameter_std=std), std=stated), named
 
 
 def _roll(ship: Vessel, record: Record) -> RollVerdict | None:
