@@ -208,3 +208,27 @@ def test_a_thruster_that_stands_still_leaves_its_own_parameter_without_an_accura
     assert np.isnan([found.runs[-1], found.track[-1]]).all()
     assert found.runs[:-1] == pytest.approx(of_tug.runs)
     assert found.track[:-1] == pytest.approx(of_tug.track)
+
+
+def test_thrusters_that_are_always_ordered_alike_leave_only_their_own_parameters_without_an_accuracy():
+    """Of a ship with two of each and no run that has them apart, the command ended with a defect."""
+    vessel = replace(case.tug(), sensors=Sensors(velocity_mps=0.01, yaw_rate_radps=0.001))
+    model, weather = vessel.model, replace(case.ENVIRONMENT, current_std_mps=0.1)
+    twice = replace(
+        model,
+        terms=(*model.terms, Term(equation="u", name="X_again", expression=model.terms[0].expression)),
+        parameters=np.append(model.parameters, 0.5 * model.parameters[0]),
+        parameter_std=np.append(model.parameter_std, 0.1),
+    )
+    assert model.terms[0].equation == "u"
+    once = replace(model, parameters=np.r_[1.5 * model.parameters[0], model.parameters[1:]])
+    of_tug, found = (
+        planned_accuracy(
+            case.plan(), replace(case.design().problem, parameters=own.names), vessel=replace(vessel, model=own),
+            environment=weather,
+        )
+        for own in (once, twice)
+    )  # fmt: skip
+    for one, other in ((of_tug.runs, found.runs), (of_tug.track, found.track)):
+        assert np.isnan(other[[0, -1]]).all()
+        assert other[1:-1] == pytest.approx(one[1:], rel=1e-4)

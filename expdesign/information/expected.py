@@ -39,6 +39,7 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel
 
 IDEAL_SHARE = 1e-12  # variance of an ideal sensor's noise, in that of the noisiest, where equations are weighed by it
 VELOCITY_STEP = 1e-6  # step of central differences, relative to the larger of 1 and the signal [m/s, rad/s]
+TOLD = 1e-6  # squared share of a parameter in what nothing tells, below which it is told
 SINGULAR = 1e12  # condition number above which a trial counts as uninformative
 
 
@@ -108,15 +109,44 @@ def covariance_of_repeats(
     names = (*parameters, *(STEADY_CURRENT if unknown_current else ()))
 
     def covariance(repeats: Array) -> Array:
-        done = [(item, weight) for item, weight in zip(rows, repeats.tolist(), strict=True) if weight]
-        size = rows[0].regressors.shape[1]
-        G, Omega = np.zeros((size, size)), np.zeros((size, size))
-        for (item, weight), Z in zip(done, _without_means(done, mean_subtraction), strict=True):
-            G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
-            Omega += weight * _score_covariance(Z, item)
-        return _sandwich(G, Omega, names)[: len(parameters), : len(parameters)]
+        return _sandwich(*_normal(rows, repeats, mean_subtraction), names)[: len(parameters), : len(parameters)]
 
     return covariance
+
+
+def expected_deviations(
+    vessel: Vessel,
+    parts: Sequence[TrialPart],
+    parameters: Sequence[str],
+    *,
+    environment: Environment,
+    mean_subtraction: str,
+    unknown_current: bool,
+) -> Array:
+    """(p,) standard deviations of the estimates of `expected_covariance`; nan of parameters that nothing tells apart.
+
+    Of a thruster that stands still, or of two that are always ordered alike, the other parameters keep theirs.
+    """
+    rows = [_rows(vessel, part, parameters, environment, "rk4", unknown_current, FREE) for part in parts]
+    G, Omega = _normal(rows, np.array([part.repeats for part in parts], dtype=float), mean_subtraction)
+    scaled, scale = _scaled(G)
+    left, sizes, right = np.linalg.svd(scaled)
+    known = sizes > sizes.max(initial=0.0) / SINGULAR
+    told = np.square(right[~known]).sum(axis=0) < TOLD
+    inverse = (right[known].T / sizes[known]) @ left[:, known].T / np.outer(scale, scale)
+    variance = np.einsum("ip,pq,iq->i", inverse, Omega, inverse)
+    return np.where(told, np.sqrt(np.maximum(variance, 0.0)), np.nan)[: len(parameters)]
+
+
+def _normal(rows: Sequence[_Rows], repeats: Array, mean_subtraction: str) -> tuple[Array, Array]:
+    """G and Omega (p, p) of parts that are repeated."""
+    done = [(item, weight) for item, weight in zip(rows, repeats.tolist(), strict=True) if weight]
+    size = rows[0].regressors.shape[1]
+    G, Omega = np.zeros((size, size)), np.zeros((size, size))
+    for (item, weight), Z in zip(done, _without_means(done, mean_subtraction), strict=True):
+        G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
+        Omega += weight * _score_covariance(Z, item)
+    return G, Omega
 
 
 def _without_means(rows: Sequence[tuple[_Rows, float]], mean_subtraction: str) -> Iterator[Array]:
@@ -328,9 +358,8 @@ def _meeting(entering: Array, leaving: Array) -> Array:
 
 
 def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:
-    scale = np.sqrt(np.abs(np.diag(G)))
-    blind = tuple(name for name, size in zip(parameters, scale, strict=True) if not size > 0)
-    scaled = G / np.outer(np.where(scale > 0, scale, 1.0), np.where(scale > 0, scale, 1.0))
+    scaled, scale = _scaled(G)
+    blind = tuple(name for name, size in zip(parameters, np.diag(scaled), strict=True) if not abs(size) > 0)
     if blind or np.linalg.cond(scaled) > SINGULAR:
         raise NotInformative(
             f"the trial contains no information about some parameters{': ' + ', '.join(blind) if blind else ''}",
@@ -338,3 +367,10 @@ def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:
         )
     inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
     return np.asarray(inverse @ Omega @ inverse.T)
+
+
+def _scaled(G: Array) -> tuple[Array, Array]:
+    """G with a diagonal of ones, or of zeros where nothing tells of a parameter, and what its sides were divided by."""
+    scale = np.sqrt(np.abs(np.diag(G)))
+    scale = np.where(scale > 0, scale, 1.0)
+    return G / np.outer(scale, scale), scale

@@ -15,10 +15,10 @@ import numpy as np
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.durations import DurationProblem
-from expdesign.errors import NoAnswer, NotInformative
+from expdesign.errors import NoAnswer
 from expdesign.export.files.text import csv_text, entry, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
-from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.information.expected import TrialPart, expected_deviations
 from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate, UnderWay
 from expdesign.plan.verify import part_of_track
 from expdesign.shortest_day import AccuracySettings
@@ -49,28 +49,22 @@ def planned_accuracy(
 ) -> PlannedAccuracy:
     """Standard deviations expected of instrumental variables, to first order in the vessel file's sensor noise.
 
-    Parameters of which nothing is told, such as those of a thruster that stands still, do not keep others from theirs.
+    Parameters that nothing tells apart do not keep others from theirs.
     """
     model, sailed, names = vessel.model, plan.sailed, problem.parameters
 
-    def deviations(parts: Sequence[TrialPart], blind: tuple[str, ...] = ()) -> Array:
-        told = np.array([name not in blind for name in names])
-        found = np.full(len(names), np.nan)
+    def deviations(parts: Sequence[TrialPart]) -> Array:
         try:
-            covariance = expected_covariance(
+            return expected_deviations(
                 vessel,
                 parts,
-                tuple(np.array(names)[told].tolist()),
+                names,
                 environment=environment,
                 mean_subtraction=problem.mean_subtraction,
                 unknown_current=environment.current_std_mps > 0,
             )
-        except NotInformative as refused:
-            return found if blind or told.sum() == len(refused.parameters) else deviations(parts, refused.parameters)
         except NoAnswer:
-            return found
-        found[told] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return found
+            return np.full(len(names), np.nan)
 
     place = [model.names.index(name) for name in names]
     nominal = model.parameters[place]
