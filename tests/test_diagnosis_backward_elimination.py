@@ -162,6 +162,12 @@ def test_rejected_causes_are_noted_with_their_tests():
     ]
     (note,) = notes_on_rejected(found, replace(kept, last_tests=tuple(left)), "runs")
     assert "a sign of a current (p = 0.0001). It is not a finding" in note
+    for names, words in (((), "wrong values of some parameters"), (("N_r",), "a wrong value of N_r")):
+        (step,) = steps_of("one").steps
+        step.chosen.candidate, step.chosen.parameters = Candidate(cause="parameters", free={"one": 0.0}), names
+        tests = (ScoreTest(candidate=step.chosen.candidate, statistic=0.0, p_value=1e-4, step=np.zeros(1)),)
+        (note,) = notes_on_rejected(replace(found, steps=(step,)), replace(kept, steps=(), last_tests=tests), "runs")
+        assert f"a sign of {words} (p = " in note
 
 
 @pytest.fixture(scope="module")

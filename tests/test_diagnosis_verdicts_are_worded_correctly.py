@@ -122,14 +122,15 @@ def test_what_shows_in_predictions_alone_is_in_the_record_and_not_lacking_in_sim
     )
     late, scale = "the dead time of the actuators", "the scale of the rate gyro"
     assert verdict([delay], BEFORE) == (
-        f"The record shows {late}, but simulations get no better with it for certain. Adding it takes 13 % (6 to 19 %) "
-        "off the squared error of predictions from sample to sample on runs held out of the fit. Use the extended "
-        "vessel file, after a look at runs that it has not seen."
+        f"The record shows {late}, but whether simulations get better with it is not certain. Adding it takes 13 % (6 "
+        "to 19 %) off the squared error of predictions from sample to sample on runs held out of the fit. Use the "
+        "extended vessel file, after a look at runs that it has not seen."
     )
+    open_still = "but whether simulations get better with it is not certain"
     assert verdict([finding("wind"), delay], BEFORE).startswith(
-        f"The simulation lacks wind; the record shows {late}, but simulations get no better with it for certain. "
+        f"The simulation lacks wind; the record shows {late}, {open_still}. "
     )
-    assert f"{late} and {scale}, but simulations get no better with them" in verdict([delay, gyro], BEFORE)
+    assert f"{late} and {scale}, but whether simulations get better with them" in verdict([delay, gyro], BEFORE)
 
 
 def test_a_verdict_without_findings_states_the_accuracy():

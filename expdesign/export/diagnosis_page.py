@@ -134,7 +134,7 @@ METHOD = Markup(
 def diagnosis_document(found: Diagnosis, roll: RollVerdict | None = None) -> Document:
     """The causes and what adding them gains, for people."""
     rolls, many = roll_sentences(roll), len(found.findings)
-    before = (f"Without {'it' if many == 1 else 'them'}, {accuracy_in_words(found.before)}.",) if many else ()
+    before = (f"With the vessel file as it is, {accuracy_in_words(found.before)}.",) if many else ()
     return Document(
         kind="Diagnosis of the simulation model",
         title=found.vessel.name,

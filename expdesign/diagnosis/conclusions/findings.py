@@ -206,12 +206,18 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     named = [step.chosen.candidate for step in kept.steps]
     rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
     return tuple(
-        f"The data show a sign of {missing_effect(step.chosen.candidate.cause, step.chosen.parameters)} (p = "
+        f"The data show a sign of {_sign_of(step)} (p = "
         f"{p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off every error, "
         "or its gain or its size may be zero."
         for step in rejected
         if (p_value := _p_value_left(step, kept)) <= SELECTION_TUNING.level
     )
+
+
+def _sign_of(step: Step) -> str:
+    """Missing effect of a cause; values of the file that are not correct are wrong ones."""
+    lacked = missing_effect(step.chosen.candidate.cause, step.chosen.parameters)
+    return lacked.replace("the correct values", "wrong values").replace("the correct", "a wrong")
 
 
 def _p_value_left(step: Step, kept: Selection) -> float:

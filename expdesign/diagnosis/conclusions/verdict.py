@@ -198,7 +198,7 @@ def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplaine
         what.append(f"the simulation lacks {listed(_named(lacked))}")
     if shown:
         them = "them" if len(shown) > 1 else "it"
-        but = f"simulations get no better with {them} for certain"
+        but = f"whether simulations get better with {them} is not certain"
         what.append(f"the record shows {listed(_named(shown))}, but {but}")
     sure = _benefits(findings, unit)
     if unexplained is not None:
