@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Commands
-from expdesign.simulation import simulate
+from expdesign.simulation import Environment, simulate
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY = SCENARIOS / "story.toml"
@@ -26,10 +26,12 @@ def wandering() -> Commands:
     return Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=values)
 
 
-def measured(path: Path, *, noise: float = 1e-3, drop=(), degrees=False, pose=(-100.0, -450.0, 1.0)):
+def measured(
+    path: Path, *, noise: float = 1e-3, drop=(), degrees=False, pose=(-100.0, -450.0, 1.0), current=(0.0, 0.0)
+):
     """A data file of the nominal ship; the last row's pose."""
     commands, rng = wandering(), np.random.default_rng(0)
-    run = simulate(SHIP, commands, pose=np.array(pose))
+    run = simulate(SHIP, commands, pose=np.array(pose), environment=Environment(current_to=np.array(current)))
     state = np.concatenate([run.pose[:-1], run.velocity[:-1] + noise * rng.standard_normal((SAMPLES, 3))], axis=1)
     table = dict(zip(NAMES, np.column_stack([np.arange(SAMPLES), state]).T, strict=True))
     if degrees:

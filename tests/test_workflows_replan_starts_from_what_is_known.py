@@ -143,6 +143,16 @@ def test_without_a_vessel_the_parameters_are_estimated_from_the_data(tmp_path):
     assert (state.ship.model.parameters != SHIP.model.parameters).all()
 
 
+@pytest.mark.parametrize("current", [(0.0, 0.0), (0.15, -0.1), (0.0, 0.3)])
+def test_a_current_that_nobody_stated_is_told_where_the_rest_is_planned_with_it_in_the_values(tmp_path, current):
+    """Values that had taken a current up were planned with, and no note said so; `estimate` of the same data did."""
+    measured(tmp_path / "a.csv", current=current)
+    state = present_state(STORY, [tmp_path / "a.csv"])
+    assert any("current" in note for note in state.notes) == any(current)
+    if not any(current):
+        assert not any("times what the vessel file states" in note for note in state.notes)
+
+
 def test_parameters_that_the_data_cannot_identify_keep_their_values_and_are_named(tmp_path):
     values = wandering().values.copy()
     values[:, 1::2] = 0.0

@@ -245,7 +245,10 @@ def in_bins(frequency: Array, rows: Array) -> tuple[Array, Array]:
 
 def misfit_of(frequency: Array, ordinates: Array, level: Array) -> float:
     """Bartlett's statistic: how far the cumulated ratio of periodogram to expectation is from a straight line."""
-    ratio = ordinates / np.maximum(level, 1e-12 * level.max())
+    floor = 1e-12 * max(level.max(), ordinates.max())
+    if not floor > 0:  # data without noise
+        return 0.0
+    ratio = ordinates / np.maximum(level, floor)
     order = np.argsort(frequency, kind="stable")
     rising = np.cumsum(ratio[order[frequency[order] > 0]])
     if not rising[-1] > 0:

@@ -21,8 +21,8 @@ def current_sentence(flow: Current) -> str:
     speed = plus_minus(math.hypot(flow.north_mps, flow.east_mps), flow.std_mps)
     return (
         f"The data show a steady current of {speed} m/s towards {toward_deg:.0f} deg, or another push that keeps its "
-        f"direction on the earth. It moves {_moved(flow.moved)} of estimates that know of none; --unknown "
-        "steady-current estimates it, too."
+        f"direction on the earth. It moves {_moved(flow.moved)} of estimates that know of none; "
+        "expdesign estimate --unknown steady-current estimates it, too."
     )
 
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.assessment import INSTRUMENTS, Assessed, EstimateOptions, assess
+from expdesign.assessment import INSTRUMENTS, Assessed, EstimateOptions, apart_from_stated, assess, with_unstated
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
 from expdesign.estimation.regression import in_depth
 from expdesign.estimation.values import Estimate, into_range
+from expdesign.export.estimate_page import advice
 from expdesign.export.files import Purchase
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.plan.values import Plan
@@ -26,15 +27,16 @@ MATTERS = 1.05  # factor of a parameter's standard deviation without some runs f
 
 
 def updated(
-    vessel: Vessel, record: Record, *, fixed: Sequence[str], prior_counts: bool, progress: Progress
+    vessel: Vessel, raw: Record, record: Record, *, fixed: Sequence[str], prior_counts: bool, progress: Progress
 ) -> tuple[Vessel, str, tuple[str, ...]]:
     """The vessel with parameters estimated from the data so far, by the method that an assessment prefers.
 
     Parameters that these data cannot determine stay at the vessel's values. All of them do if no estimate gives a model
-    that can simulate the data. Notes say so.
+    that can simulate the data. Notes say so, and what is said of such an estimate by `expdesign estimate`.
 
     Args:
-        record: the data, draught over depth among its inputs where the model reads depth.
+        raw: the data, with commands as inputs.
+        record: the same with what the actuators delivered, and with draught over depth where the model reads depth.
         fixed: parameters that are not to be estimated.
         prior_counts: whether to combine the estimate with the vessel's values by their standard deviations.
 
@@ -64,6 +66,8 @@ def updated(
             [f"The data so far cannot determine {', '.join(held)}. The values known before are kept."] if held else []
         )
         notes.append(_fit_note(found.best))
+        notes += advice(with_unstated(vessel, raw, options, found))
+        notes += () if prior_counts else apart_from_stated(found.best.estimate, vessel.model)
         how = ", combined with what was known before" if prior_counts else ""
         return ship, f"estimated from the data so far by {found.best.method.title}{how}", tuple(notes)
     return _unchanged(vessel, "they determine no parameter")

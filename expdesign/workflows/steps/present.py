@@ -80,7 +80,7 @@ def present_state(
     under_way = None if stopped else present_motion(seen, record, ship, data[-1])
     if vessel is None:
         fixed, prior_counts = first.design.fixed_parameters, first.design.prior == "parameter_std"
-        ship, origin, notes = updated(ship, seen, fixed=fixed, prior_counts=prior_counts, progress=progress)
+        ship, origin, notes = updated(ship, record, seen, fixed=fixed, prior_counts=prior_counts, progress=progress)
         notes = (*seen.notes, *notes)
     return PresentState(
         first=first,
