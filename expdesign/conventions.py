@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,13 @@ def rotation(heading_rad: float) -> Array:
     """R_nb of shape (2, 2): turns b-frame (forward, starboard) into n-frame (north, east)."""
     c, s = np.cos(heading_rad), np.sin(heading_rad)
     return np.array([[c, -s], [s, c]])
+
+
+def rotated(vector: Any, angle_rad: Array | float) -> tuple[Array, Array]:
+    """A vector (2, ...) turned clockwise: from the b-frame to the n-frame by headings, back by minus these."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    x, y = vector
+    return np.asarray(x * c - y * s), np.asarray(x * s + y * c)
 
 
 def to_n_frame(points_b: Array, pose: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array, seal, sealed
@@ -189,6 +190,11 @@ class Record:
     faults: tuple[str, ...] = ()  # those of the doubts that stand in the data as they are used
     # effect of `vessel.quantities` -> least and greatest value of it that instruments show of each other
     shown: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+def last_seen(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(k,) place of the last sample seen, up to each one; before the first, that of the first."""
+    return np.asarray(np.maximum.accumulate(np.where(seen, np.arange(len(seen)), seen.argmax())))
 
 
 def fit_percent(measured: Array, simulated: Array) -> Array:

@@ -33,6 +33,7 @@ import scipy
 
 from expdesign.assessment.ahead import LARGEST_ERROR, Ahead, by_run, typical
 from expdesign.assessment.misfit import AHEAD_S
+from expdesign.conventions import rotated
 from expdesign.errors import Diverged, InputError, NoAnswer
 from expdesign.estimation.methods import Method
 from expdesign.estimation.regression import model_for
@@ -270,9 +271,8 @@ def _through_water(batch: Batch, found: Found | None) -> Batch:
     """The run in the frame of the water, in which a ship moves as she does in still water."""
     if found is None or found.current is None or batch.pose is None:
         return batch
-    (north, east), c, s = found.current, np.cos(batch.pose[:, 2]), np.sin(batch.pose[:, 2])
     velocity = np.array(batch.velocity)
-    velocity[:, :2] -= np.stack([c * north + s * east, c * east - s * north], axis=1)
+    velocity[:, :2] -= np.stack(rotated(found.current, -batch.pose[:, 2]), axis=1)
     return replace(batch, velocity=velocity)
 
 

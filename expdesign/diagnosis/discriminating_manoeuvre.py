@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expdesign.conventions import rotated
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import Motion, simulate_windows
@@ -63,9 +64,7 @@ def mean_measured_wind(like: Windows) -> Array | None:
     """(2,) mean velocity of the air to north and east in data that measure it [m/s]."""
     if not like.has_wind:
         return None
-    c, s = np.cos(like.heading), np.sin(like.heading)
-    u, v = np.moveaxis(like.wind, -1, 0)
-    return np.array([np.mean(u * c - v * s), np.mean(u * s + v * c)])
+    return np.array([np.mean(part) for part in rotated(np.moveaxis(like.wind, -1, 0), like.heading)])
 
 
 def _sailed(ship: ExtendedModel, windows: Windows, proposals: Sequence[Proposal]) -> Motion:

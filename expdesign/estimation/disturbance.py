@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.conventions import rotated
 from expdesign.errors import InputError
 from expdesign.estimation.regression import DIFFERENCE, EAST, NORTH, PRODUCT, STEADY_CURRENT, Share, heading_of
 from expdesign.estimation.values import Estimate
@@ -130,8 +131,7 @@ def measured_wind(record: Record) -> MeasuredWind | None:
         if batch.wind is None:
             continue
         heading, (u, v) = heading_of(batch), (batch.velocity[:, :2] - batch.wind).T
-        c, s = np.cos(heading), np.sin(heading)
-        rows.append(np.stack([u * c - v * s, u * s + v * c], axis=1))
+        rows.append(np.stack(rotated((u, v), heading), axis=1))
     wind = np.concatenate(rows) if rows else np.zeros((0, 2))
     wind = wind[np.isfinite(wind).all(axis=1)]
     if len(wind) < 2:

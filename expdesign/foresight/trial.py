@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expdesign.conventions import rotated
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import Fit
@@ -97,8 +98,7 @@ def exact_record(runs: Sequence[tuple[str, Commands, Trajectory]], wind_to: Arra
     for name, commands, motion in runs:
         count = len(commands)
         heading, velocity = motion.pose[:count, 2], motion.velocity[:count]
-        c, s = np.cos(heading), np.sin(heading)
-        air = np.column_stack([wind_to[0] * c + wind_to[1] * s, wind_to[1] * c - wind_to[0] * s])
+        air = np.column_stack(rotated(wind_to, -heading))
         batches.append(
             Batch(
                 name=name,

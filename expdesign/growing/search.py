@@ -13,6 +13,7 @@ from zlib import crc32
 
 import numpy as np
 
+from expdesign.conventions import rotated
 from expdesign.dictionary import Family, PrimitiveSpec, Setting
 from expdesign.dictionary.build import excite_many
 from expdesign.errors import InputError
@@ -279,7 +280,7 @@ def made_good_m(motion: Array, sample_time_s: float) -> Array:
     """(n,) distance from begin to end of motions (n, k + 1, 3) through calm water, by the trapezoidal rule."""
     u, v, r = np.moveaxis((motion[:, 1:] + motion[:, :-1]) / 2, -1, 0)
     heading = (np.cumsum(r, axis=1) - r / 2) * sample_time_s
-    along, across = u * np.cos(heading) - v * np.sin(heading), u * np.sin(heading) + v * np.cos(heading)
+    along, across = rotated((u, v), heading)
     return np.asarray(np.hypot(along.sum(axis=1), across.sum(axis=1)) * sample_time_s)
 
 

@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from expdesign.conventions import rotated
 from expdesign.errors import NoAnswer
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, Mapping
@@ -246,10 +247,9 @@ def _ground_velocity(table: dict[str, Channel], mapping: Mapping) -> tuple[dict[
     times = north.time_s[known]
     angle = np.interp(times, heading.time_s, np.unwrap(heading.values))
     ahead, right = north.values[known], np.interp(times, east.time_s, east.values)
-    c, s = np.cos(angle), np.sin(angle)
+    u, v = rotated((ahead, right), -angle)
     rate = np.interp(times, table["r_radps"].time_s, table["r_radps"].values) if "r_radps" in table else np.zeros(1)
-    u = c * ahead + s * right + rate * mapping.antenna_starboard_m
-    v = c * right - s * ahead - rate * mapping.antenna_forward_m
+    u, v = u + rate * mapping.antenna_starboard_m, v - rate * mapping.antenna_forward_m
     for name, values in (("u_mps", u), ("v_mps", v)):
         table[name] = replace(north, name=name, time_s=times, values=values)
     return table, [
@@ -351,8 +351,7 @@ def _finished(columns: dict[str, Array], mapping: Mapping) -> dict[str, Array]:
     ahead, beside = mapping.antenna_forward_m, mapping.antenna_starboard_m
     if not (ahead or beside) or "heading_rad" not in columns:
         return columns
-    c, s = np.cos(columns["heading_rad"]), np.sin(columns["heading_rad"])
-    north, east = c * ahead - s * beside, s * ahead + c * beside
+    north, east = rotated((ahead, beside), columns["heading_rad"])
     if "lat_deg" in columns:
         columns["lon_deg"] = columns["lon_deg"] - np.degrees(east / EARTH_M) / np.cos(np.radians(columns["lat_deg"]))
         columns["lat_deg"] = columns["lat_deg"] - np.degrees(north / EARTH_M)

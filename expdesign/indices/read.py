@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from expdesign.conventions import wrap_angle
+from expdesign.conventions import rotated, wrap_angle
 from expdesign.indices.criteria import ZIGZAG_DEVIATION_RAD, Circle, Execute, Stop, ZigZag
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Helm
@@ -36,11 +36,9 @@ class SteeredRun:
 
     @cached_property
     def _motion(self) -> scipy.interpolate.CubicHermiteSpline:
-        c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
         u, v, r = self.velocity.T
-        return scipy.interpolate.CubicHermiteSpline(
-            self.time_s, self.pose, np.stack([u * c - v * s, u * s + v * c, r], axis=1)
-        )
+        rates = np.stack([*rotated((u, v), self.pose[:, 2]), r], axis=1)
+        return scipy.interpolate.CubicHermiteSpline(self.time_s, self.pose, rates)
 
     @property
     def sample_time_s(self) -> float:

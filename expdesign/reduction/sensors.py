@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import OUTPUTS, rotated
 from expdesign.records import central_difference, smoothed_velocity
 from expdesign.signals import Batch
 from expdesign.values import Array
@@ -252,5 +252,4 @@ def _at_centre(uv: Array, place: tuple[float, float], r: Array) -> Array:
 
 def turned(vectors: Array, angle: Array) -> Array:
     """(k, 2) turned clockwise by angles (k,): from the b-frame to the n-frame for headings."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=-1)
+    return np.stack(rotated(vectors.T, angle), axis=-1)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from expdesign.conventions import wrap_angle
+from expdesign.conventions import rotated, wrap_angle
 from expdesign.signals import AUXILIARY, Commands, Trajectory
 from expdesign.simulation.environment import Environment, WeatherSeries, weather_rows
 from expdesign.simulation.motion import to_body
@@ -116,8 +116,7 @@ def _along_axes(angle_rad: float, u: Array, v: Array) -> tuple[Array, Array]:
     """Components along axes that are turned clockwise from the ship's by an angle."""
     if not angle_rad:
         return u, v
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    return c * u + s * v, c * v - s * u
+    return rotated((u, v), -angle_rad)
 
 
 def _readings(timing: tuple[float, float], count: int, sample_time_s: float) -> tuple[Array | None, Any]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import OUTPUTS, rotated
 from expdesign.estimation.regression import inputs_of
 from expdesign.records import central_difference
-from expdesign.signals import Batch, Record
+from expdesign.signals import Batch, Record, last_seen
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
@@ -88,7 +87,7 @@ class SampledBatch:
         self.wind = midpoints(self._between(self._centred(wind)))
         self.depth = np.full(len(self.heading), np.inf)
         if batch.depth_m is not None and has_depth(batch):
-            depth = batch.depth_m[_last_seen(np.isfinite(batch.depth_m))]
+            depth = batch.depth_m[last_seen(np.isfinite(batch.depth_m))]
             self.depth = self._between(self._centred(depth))
 
     def measured(self, derived: tuple[str, ...]) -> Array:
@@ -143,17 +142,9 @@ class SampledBatch:
 
 
 def wind_held_over_gaps(air: Array, heading: Array) -> Array:
-    """(k, 2) wind in the b-frame ; gaps hold the last measured value in the n-frame."""
-    step_numbers = _last_seen(np.asarray(np.isfinite(air).all(axis=1)))
-    turned = heading - heading[step_numbers]
-    c, s, held = np.cos(turned), np.sin(turned), air[step_numbers]
-    return np.stack([held[:, 0] * c + held[:, 1] * s, held[:, 1] * c - held[:, 0] * s], axis=-1)
-
-
-def _last_seen(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(k,) index of the last measured sample at every sample; before the first one, that of the first."""
-    step_numbers = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), -1))
-    return np.asarray(np.where(step_numbers < 0, np.argmax(seen), step_numbers))
+    """(k, 2) wind in the b-frame; gaps hold the last measured value in the n-frame."""
+    held = last_seen(np.asarray(np.isfinite(air).all(axis=1)))
+    return np.stack(rotated(air[held].T, heading[held] - heading), axis=-1)
 
 
 def midpoints(values: Array) -> Array:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import OUTPUTS, rotated
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import (
@@ -112,11 +112,11 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
             u, v = simpson_mean(u, finer), simpson_mean(v, finer)
         else:
             u, v = simpson_mean_of_track(u, v, headings, finer)
-    u, v = _rotated(u, v, ship.get("heading_bias"))
+    u, v = rotated((u, v), ship.get("heading_bias"))  # axes anticlockwise of the ship's: surge leaks into sway
     if not from_position:
         u, v = _with_faults(ship, "u", u), _with_faults(ship, "v", v)
     if from_position and ship.get("late:psi"):
-        u, v = _rotated(u, v, _turn(ship.get("late:psi"), r, headings, windows))
+        u, v = rotated((u, v), _turn(ship.get("late:psi"), r, headings, windows))
     channels = {"u": u, "v": v, "r": _with_faults(ship, "r", r), "psi_rate": simpson_mean(r, finer)}
     if headings is not None and finer == 1:
         channels["psi_rate"] = heading_differences(headings, channels["psi_rate"], windows)
@@ -129,7 +129,7 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
             channels[name] = _shifted(channels[name], delay / windows.sample_s)
     if from_position and ship.get("late:position"):
         turn = _turn(ship.get("late:position"), r, headings, windows)
-        channels["u"], channels["v"] = _rotated(channels["u"], channels["v"], -turn)
+        channels["u"], channels["v"] = rotated((channels["u"], channels["v"]), -turn)
     return np.stack(list(channels.values()), axis=-1)
 
 
@@ -137,19 +137,13 @@ def ship_velocities(ship: ExtendedModel, predicted: Array) -> Array:
     """(w, 3) velocities of the ship for sensor outputs (w, 3), without delays."""
     gains, offsets = np.transpose([ship.gain_and_offset(name) for name in OUTPUTS])
     u, v, r = ((predicted - offsets) / gains).T
-    u, v = _rotated(u, v, -ship.get("heading_bias"))
+    u, v = rotated((u, v), -ship.get("heading_bias"))
     return np.stack([u + ship.get("lever:starboard") * r, v - ship.get("lever:forward") * r, r], axis=-1)
 
 
 def _with_faults(ship: ExtendedModel, signal: str, true: Array) -> Array:
     gain, offset = ship.gain_and_offset(signal)
     return gain * true + offset
-
-
-def _rotated(u: Array, v: Array, angle: Array | float) -> tuple[Array, Array]:
-    """Velocities along axes that lie anticlockwise of the ship's by an angle: surge leaks into sway as u sin(angle)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return u * c - v * s, v * c + u * s
 
 
 LATE = {"u": ("u", "position"), "v": ("v", "position"), "r": ("r",), "psi_rate": ("psi",)}
@@ -181,9 +175,8 @@ def simpson_mean_of_track(u: Array, v: Array, heading: Array, finer: int = 1) ->
 
     The ship turns meanwhile, so this differs from the mean of u and v.
     """
-    c, s = np.cos(heading), np.sin(heading)
-    north, east = simpson_mean(u * c - v * s, finer), simpson_mean(u * s + v * c, finer)
-    return north * c + east * s, east * c - north * s
+    north, east = (simpson_mean(part, finer) for part in rotated((u, v), heading))
+    return rotated((north, east), -heading)
 
 
 def _turn(delay_s: float, r: Array, headings: Array | None, windows: Windows) -> Array:

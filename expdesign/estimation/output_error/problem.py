@@ -12,7 +12,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, drive_of, heading_of, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
-from expdesign.signals import Batch, Record
+from expdesign.signals import Batch, Record, last_seen
 from expdesign.values import Array
 from expdesign.vessel import Sensors
 
@@ -263,11 +263,10 @@ def _wind(batch: Batch) -> Array:
     """(k, 2) the wind's velocity in the b-frame."""
     assert batch.wind is not None  # the regression was built from it
     wind = batch.velocity[:, :2] - batch.wind
-    seen = np.isfinite(wind).all(axis=1)
+    seen = np.asarray(np.isfinite(wind).all(axis=1))
     if not seen.any():
         raise InputError(f"{batch.name}: no sample has velocity and relative wind")
-    places = np.maximum.accumulate(np.where(seen, np.arange(len(batch)), int(seen.argmax())))
-    return np.asarray(wind[places])
+    return np.asarray(wind[last_seen(seen)])
 
 
 def first_states(problem: Problem, found: Mapping[Place, Array]) -> Array:

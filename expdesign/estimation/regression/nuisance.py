@@ -211,9 +211,8 @@ class Guess:
 
 def through_water(table: Table, to_mps: Array) -> Table:
     """The table with velocities u and v through water that moves to north and east [m/s]; those through air stay."""
-    c, s = np.cos(table["psi"]), np.sin(table["psi"])
-    north, east = to_mps
-    return {**table, "u": table["u"] - (north * c + east * s), "v": table["v"] - (east * c - north * s)}
+    u, v = to_body(to_mps, table["psi"], NUMPY)
+    return {**table, "u": table["u"] - u, "v": table["v"] - v}
 
 
 def slopes(model: VesselModel, parameters: Array, table: Table, *, turning: bool = True) -> Array:

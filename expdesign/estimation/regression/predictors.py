@@ -52,7 +52,7 @@ from expdesign.estimation.regression.regression import (
     inputs_within,
     measured_table,
 )
-from expdesign.signals import Batch, Record
+from expdesign.signals import Batch, Record, last_seen
 from expdesign.simulation.motion import turns_current
 from expdesign.values import Array, closed
 from expdesign.vessel import NUMPY, VesselModel
@@ -401,6 +401,5 @@ def headings_at(record: Record, used: Sequence[Integers]) -> Array | None:
         seen = np.isfinite(heading)
         if not seen.any():
             return None
-        latest = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), int(seen.argmax())))
-        found.append(heading[latest][places])
+        found.append(heading[last_seen(seen)[places]])
     return np.concatenate(found)

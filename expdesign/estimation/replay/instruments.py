@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.conventions import rotated
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.estimation.regression import (
     VANE,
@@ -41,7 +42,7 @@ from expdesign.estimation.regression import (
     room_for,
 )
 from expdesign.estimation.replay.replay import Replay
-from expdesign.signals import Batch, Record
+from expdesign.signals import Batch, Record, last_seen
 from expdesign.simulation import to_body
 from expdesign.values import Array, frozen_set
 from expdesign.vessel import NUMPY, column_name
@@ -152,7 +153,7 @@ def carried_heading(measured: Array, simulated: Array) -> Array:
     """(k,) last heading measured before each sample plus the simulated turn since; nothing measured: as simulated."""
     if not np.isfinite(measured).any():
         return simulated
-    before = _last_seen(np.isfinite(measured))
+    before = _seen_before(np.isfinite(measured))
     return np.asarray(measured[before] + simulated - simulated[before])
 
 
@@ -168,19 +169,16 @@ def instrument_wind(batch: Batch, kind: str) -> Array:
         raise InputError(f"{batch.name}: instruments for wind need measured relative wind and heading")
     seen &= np.isfinite(batch.wind).all(axis=1)
     u, v = (batch.velocity[:, :2] - batch.wind).T
-    c, s = np.cos(heading), np.sin(heading)
-    wind = np.stack([u * c - v * s, u * s + v * c])
+    wind = np.stack(rotated((u, v), heading))
     if kind == "mean":
         return np.repeat(wind[:, seen].mean(axis=1, keepdims=True), len(batch), axis=1)
-    return np.asarray(wind[:, _last_seen(seen)])
+    return np.asarray(wind[:, _seen_before(seen)])
 
 
-def _last_seen(seen: NDArray[np.bool_]) -> Integers:
+def _seen_before(seen: NDArray[np.bool_]) -> Integers:
     """(k,) the latest sample before each one at which something was seen; before the first, the first."""
-    count = len(seen)
-    latest = np.maximum.accumulate(np.where(seen, np.arange(count), -1))
-    before = np.concatenate([[-1], latest[:-1]])
-    return np.where(before < 0, int(np.argmax(seen)), before)
+    latest = last_seen(seen)
+    return np.concatenate([latest[:1], latest[:-1]])
 
 
 # Samples whose inputs follow the ship's motion: left out, or with instruments from the commands as planned.

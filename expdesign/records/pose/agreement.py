@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.conventions import KNOTS_PER_MPS
+from expdesign.conventions import KNOTS_PER_MPS, rotated
 from expdesign.records.file import Table
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array
@@ -297,8 +297,7 @@ def _integral(rates: Array, windows: Array, sample_time_s: float) -> Array:
 
 
 def _to_n(velocity: Array, heading_rad: Array) -> Array:
-    c, s = np.cos(heading_rad), np.sin(heading_rad)
-    return np.stack([c * velocity[:, 0] - s * velocity[:, 1], s * velocity[:, 0] + c * velocity[:, 1]], axis=-1)
+    return np.stack(rotated(velocity[:, :2].T, heading_rad), axis=-1)
 
 
 def _swapped(table: Table) -> Array:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.conventions import OUTPUTS, POSE_COLUMNS, VELOCITY_COLUMNS
+from expdesign.conventions import OUTPUTS, POSE_COLUMNS, VELOCITY_COLUMNS, rotated
 from expdesign.errors import FileError
 from expdesign.records.file import Table, mistyped
 from expdesign.values import Array
@@ -153,9 +153,8 @@ def smoothed_velocity(pose: Array, sample_time_s: float, *, heading_std_rad: flo
 
 def turned_to_b(rates: Array, heading_rad: Array) -> Array:
     """R(psi)^T applied to n-frame rates (k, 3) [m/s, m/s, rad/s] at headings (k,)."""
-    c, s = np.cos(heading_rad), np.sin(heading_rad)
     north, east, turn = rates.T
-    return np.stack([c * north + s * east, c * east - s * north, turn], axis=-1)
+    return np.stack([*rotated((north, east), -heading_rad), turn], axis=-1)
 
 
 MEASURED, DIFFERENCE, SMOOTHED = "measured", "difference", "smoothed"
