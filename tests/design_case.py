@@ -106,6 +106,11 @@ def duration_problem(
     )
 
 
+def sensitivities(matrices: Array, fractions: Array) -> Array:
+    """(q,) trace(B(w)^-1 B_q) of a design, the slope of log det B(w)."""
+    return np.asarray(np.einsum("ij,qji->q", np.linalg.inv(np.tensordot(fractions, matrices, axes=1)), matrices))
+
+
 def random_matrices(rng: np.random.Generator, *, count: int, parameters: int, outputs: int, samples: int) -> Array:
     """(count, p + n, p + n) [[X, Y], [Y^T, I]] of regressors drawn around a random offset, one output each."""
     output = np.arange(parameters) % outputs

@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from design_case import WIND, duration_problem, random_matrices, scored_example, vessel
+from design_case import WIND, duration_problem, random_matrices, scored_example, sensitivities, vessel
 from expdesign.durations import (
     DurationDesign,
     DurationProblem,
     build_durations,
     log_det,
-    sensitivities,
     solve_durations,
 )
 from expdesign.durations.certificate import scaled, whitened
@@ -113,25 +112,6 @@ def test_large_dictionaries_are_certified(count: int):
     matrices = random_matrices(np.random.default_rng(count), count=count, parameters=18, outputs=3, samples=12)
     problem = duration_problem(matrices, means=3)
     assert certificate(solved(problem)) < CERTIFICATE
-
-
-@dictionaries
-def test_the_weighted_mean_of_the_sensitivities_is_the_dimension_at_any_design(dictionary: str):
-    problem = example(dictionary)
-    matrices, _ = scaled(problem.matrices)
-    for draw in range(20):
-        w = np.random.default_rng(draw).dirichlet(np.ones(len(matrices)))
-        assert w @ sensitivities(matrices, w) == pytest.approx(problem.dimension, rel=1e-7)
-
-
-@dictionaries
-def test_the_sensitivities_are_the_slope_of_the_log_det(dictionary: str):
-    matrices, _ = scaled(example(dictionary).matrices)
-    w = np.full(len(matrices), 1 / len(matrices))
-    step = 1e-5 * np.eye(len(matrices))
-    slope = [(log_det(matrices, w + e) - log_det(matrices, w - e)) / 2e-5 for e in step]
-    # A central difference errs by step^2 times the third derivative, here of the order of (d_q / w_q) squared at most.
-    np.testing.assert_allclose(slope, sensitivities(matrices, w), rtol=1e-5)
 
 
 def schur_cost(problem: DurationProblem, w: Array) -> float:

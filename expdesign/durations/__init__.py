@@ -1,6 +1,6 @@
 """Durations: how long to run each primitive, with a certificate."""
 
-from expdesign.durations.certificate import DurationDesign, log_det, scaled, sensitivities, whitened
+from expdesign.durations.certificate import DurationDesign, log_det, scaled, whitened
 from expdesign.durations.concave import Collected
 from expdesign.durations.criteria import CRITERIA, Aim
 from expdesign.durations.efficiency import Efficiencies, efficiencies, limits_kept, pool_gains

@@ -136,17 +136,6 @@ def log_det(matrices: Array, fractions: Array) -> float:
     return float(np.log(eigenvalues).sum()) if eigenvalues[0] > SINGULAR * eigenvalues[-1] else -np.inf
 
 
-def sensitivities(matrices: Array, fractions: Array) -> Array:
-    """(q,) d_q = trace(B(w)^-1 B_q).
-
-    Raises:
-        numpy.linalg.LinAlgError: B(w) is not positive definite.
-    """
-    factor = scipy.linalg.cho_factor(np.tensordot(fractions, matrices, axes=1))
-    inverse = scipy.linalg.cho_solve(factor, np.eye(matrices.shape[1]))
-    return np.asarray(np.einsum("ij,qji->q", inverse, matrices))
-
-
 def certify(
     task: ConcaveProblem, w: Array, *, kind: str, multipliers: Sequence[Array] = ()
 ) -> tuple[Certificate, Array]:

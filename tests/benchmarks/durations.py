@@ -26,7 +26,7 @@ import cvxpy
 import numpy as np
 from scipy.optimize import minimize
 
-from design_case import CALM, WIND, duration_problem, example_dictionary, random_matrices, vessel
+from design_case import CALM, WIND, duration_problem, example_dictionary, random_matrices, sensitivities, vessel
 from expdesign.durations import (
     Aim,
     Budget,
@@ -37,7 +37,6 @@ from expdesign.durations import (
     log_det,
     optimal_shares,
     scaled,
-    sensitivities,
     solve_durations,
 )
 from expdesign.durations.maximise import _by_cvxpy, maximised
