@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 OUTPUTS = ("u", "v", "r")
+AXES = {"u": "surge", "v": "sway", "r": "yaw"}
 POSE_COLUMNS = ("north_m", "east_m", "heading_rad")
 VELOCITY_COLUMNS = ("u_mps", "v_mps", "r_radps")
 METRES_PER_NAUTICAL_MILE = 1852.0

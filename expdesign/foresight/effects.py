@@ -31,6 +31,7 @@ from expdesign.diagnosis.vessel_file import extend, extended_model, public_name
 from expdesign.errors import InputError, NoAnswer
 from expdesign.foresight.trial import exact_record
 from expdesign.indices import outcomes
+from expdesign.indices.outcomes import ZIGZAGS
 from expdesign.memory import in_order
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Conduct, Environment, simulate, steady_ahead, stopping, turning_circle, zigzag
@@ -176,7 +177,6 @@ BEYOND_STD = 3.0  # a parameter matters from so many of its stated standard devi
 OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoot_20_20_rad")
 """Of the standard trials, whose change matters."""
 WORDS = dict(zip(OUTCOMES, ("advance", "tactical diameter", "10/10 overshoot", "20/20 overshoot"), strict=True))
-ZIGZAGS = (math.radians(10.0), math.radians(20.0))
 PROPORTIONAL = ("theta:", "term:")  # effects in proportion to their size
 NEGLIGIBLE = 1e-6  # loss of fit [points] that counts as none
 

@@ -21,8 +21,8 @@ from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG,
 from expdesign.kinematics import held
 from expdesign.records.file import PLANNED, REACHED, STEERED, input_name, is_input
 from expdesign.values import Array
+from expdesign.vessel.structures import FORCE_SIGNALS
 
-FORCES = ("tau_x", "tau_y", "tau_psi")
 MAIN = ("lat_deg", "lon_deg", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", NORTHWARD, EASTWARD, "r_radps")
 PAIRS = (
     ("lat_deg", "lon_deg"),
@@ -346,8 +346,8 @@ def _resampled(name: str, channel: Channel, times: Array, step_s: float) -> Arra
 
 def _finished(columns: dict[str, Array], mapping: Mapping) -> dict[str, Array]:
     """The columns of our CSV: all three forces, positions of midships."""
-    if forces := [name for name in FORCES if name in columns]:
-        columns |= {name: np.zeros(len(columns[forces[0]])) for name in FORCES if name not in columns}
+    if forces := [name for name in FORCE_SIGNALS if name in columns]:
+        columns |= {name: np.zeros(len(columns[forces[0]])) for name in FORCE_SIGNALS if name not in columns}
     ahead, beside = mapping.antenna_forward_m, mapping.antenna_starboard_m
     if not (ahead or beside) or "heading_rad" not in columns:
         return columns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from expdesign.conventions import AXES
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, first, rounded
 from expdesign.diagnosis.model import (
     ADVANCE_LOSS,
@@ -62,7 +63,6 @@ CHANGE_POINT = Cause(
     candidates=_candidates_change_point,
     explain=_explain_change_point,
 )
-WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 
 
 def _candidates_load_change(situation: Situation) -> tuple[Candidate, ...]:
@@ -76,9 +76,7 @@ def _candidates_load_change(situation: Situation) -> tuple[Candidate, ...]:
 
 
 def _explain_load_change(values: Values, _ship: ExtendedModel) -> str:
-    parts = ", ".join(
-        f"{WORDS[key[-1]]} by {rounded(100 * value, 100 * std)} %" for key, (value, std) in values.items()
-    )
+    parts = ", ".join(f"{AXES[key[-1]]} by {rounded(100 * value, 100 * std)} %" for key, (value, std) in values.items())
     return f"Damping and thrust are wrong by the same factor, so the inertia differs from the model's: {parts}."
 
 
@@ -200,11 +198,10 @@ ROLL_COUPLING = Cause(
 def _explain_unlisted_term(values: Values, ship: ExtendedModel) -> str:
     key, value, std = first(values)
     term = ship.library[key.split(":", 1)[1]]
-    axis = {"u": "surge", "v": "sway", "r": "yaw"}[term.equation]
     return (
         f"No cause of the catalogue matches. Of many products of motion and inputs, a term like {term.expression} in "
-        f"{axis} explains most, {rounded(value, std)}. Its form is a fit to these data, not physics: look for an "
-        "effect of that form."
+        f"{AXES[term.equation]} explains most, {rounded(value, std)}. Its form is a fit to these data, not physics: "
+        "look for an effect of that form."
     )
 
 

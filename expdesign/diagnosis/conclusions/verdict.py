@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.conventions import listed, plus_minus
+from expdesign.conventions import AXES, listed, plus_minus
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, SENSOR_CAUSES
 from expdesign.diagnosis.data import Windows
@@ -22,7 +22,6 @@ from expdesign.values import Array
 DIVERGED_FIT = -300.0  # fit [%] below which the simulation has diverged from the ship; the number then has no meaning
 MISSING_EFFECTS = {cause.name: cause.missing for cause in CAUSES if cause.missing}
 """Cause -> missing effect of the simulation."""
-WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 MANOEUVRES = {
     "zigzag": "a zig-zag",
     "zigzag_long": "a long zig-zag",
@@ -98,8 +97,8 @@ def _reduction(best: ErrorReduction, verbs: tuple[str, str] = ("halves", "cuts")
     halves, cuts = verbs
     interval = f"({_percent(best.low)} to {_percent(best.high)} %)"
     if abs(best.share - 0.5) < 0.025:
-        return f"{halves} the {WORDS[best.output]} error {interval}"
-    return f"{cuts} the {WORDS[best.output]} error by {_percent(best.share)} % {interval}"
+        return f"{halves} the {AXES[best.output]} error {interval}"
+    return f"{cuts} the {AXES[best.output]} error by {_percent(best.share)} % {interval}"
 
 
 def unit_name(windows: Windows, *, in_stretches: bool = False) -> str:
@@ -284,7 +283,7 @@ def remarks(
         found.append(f"The error that is left beside the findings looks like {listed(beside)}, {what}.")
     if unexplained is not None:
         shares = [
-            f"{_percent(share)} % off the {WORDS[name]} error"
+            f"{_percent(share)} % off the {AXES[name]} error"
             for name, share in zip(unexplained.outputs, unexplained.force_share.tolist(), strict=True)
             if np.isfinite(share)
         ]
@@ -316,7 +315,7 @@ def _fits(unexplained: Unexplained) -> str:
 
 
 def _fits_in_words(outputs: Sequence[str], fits: Array) -> str:
-    rows = [(WORDS[name], fit) for name, fit in zip(outputs, fits.tolist(), strict=True) if np.isfinite(fit)]
+    rows = [(AXES[name], fit) for name, fit in zip(outputs, fits.tolist(), strict=True) if np.isfinite(fit)]
     diverged = [word for word, fit in rows if fit < DIVERGED_FIT]
     known = [f"{fit:.0f} % in {word}" for word, fit in rows if fit >= DIVERGED_FIT]
     parts = [f"the fit is {listed(known)}"] if known else []

@@ -12,14 +12,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import AXES, OUTPUTS
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ANGLE_STEMS, group_columns
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of, exogenous_inputs, stacked_rates
 from expdesign.values import Array
 from expdesign.vessel import stem
 
-WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 LAG_S, MORE_LAG_S = 4.0, 1.0  # of an actuator without a lag, and beyond one that it has
 TIMES = 9  # number of times at which an effect may begin, evenly over the data
 SATURATED = (0.5, 0.75)  # quantiles of an input at which it may saturate
@@ -54,7 +53,7 @@ def _steady(linear: LinearisedMotion) -> Iterator[Kind]:
     end_s = max(float(linear.motion.windows.run_time_s[:, :-1].max()), 1.0)
     for name in linear.motion.ship.model.outputs:
         axis, unit = OUTPUTS.index(name), "rad/s\N{SUPERSCRIPT TWO}" if name == "r" else "m/s\N{SUPERSCRIPT TWO}"
-        words = f"a steady {'moment' if name == 'r' else 'force'} in {WORDS[name]}"
+        words = f"a steady {'moment' if name == 'r' else 'force'} in {AXES[name]}"
         steady, growing = (partial(_force, axis, values) for values in (_ones, partial(_grown, end_s)))
         yield Kind(words=words, unit=unit, disturbance=steady)
         yield Kind(words=f"{words} that grows with time", unit=f"{unit} at the end", disturbance=growing)
@@ -75,7 +74,7 @@ def _by_heading(linear: LinearisedMotion) -> Iterator[Kind]:
         for times in (1, 2):
             for shape in (np.sin, np.cos):
                 text = f"{shape.__name__}({'' if times == 1 else '2 '}heading)"
-                words = f"a force in {WORDS[name]} that goes with {text}"
+                words = f"a force in {AXES[name]} that goes with {text}"
                 values = partial(_of_heading, shape, times)
                 yield Kind(words=words, unit="", disturbance=partial(_force, OUTPUTS.index(name), values))
 

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.conventions import AXES
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
@@ -36,7 +37,7 @@ from expdesign.diagnosis.fit import (
     window_information,
 )
 from expdesign.diagnosis.motion import exogenous_inputs, initial_states, term_disturbances
-from expdesign.diagnosis.remainder.kinds import WORDS, Kind, kinds
+from expdesign.diagnosis.remainder.kinds import Kind, kinds
 from expdesign.diagnosis.remainder.stability_selection import (
     MOST_TERMS,
     Chosen,
@@ -217,7 +218,7 @@ def _missing(
 ) -> Missing:
     if chosen.index < len(terms):
         term = terms[chosen.index]
-        words, unit = f"a term like {term.expression} in {WORDS[term.equation]}", ""
+        words, unit = f"a term like {term.expression} in {AXES[term.equation]}", ""
     else:
         kind, term = others[chosen.index - len(terms)], None
         words, unit = kind.words, kind.unit
