@@ -55,6 +55,24 @@ def test_errors_grow_over_the_times_that_the_axis_says(clean):
     assert len(np.unique(rows, axis=0)) == len(rows)
 
 
+@pytest.mark.parametrize("growing", [0.0, 0.01, 1.0, 1e6])
+def test_a_line_of_errors_leaves_the_figure_only_where_the_simulation_diverges(monkeypatch, clean, growing):
+    """A level line has no range of values, and is drawn whole, too."""
+    steps = np.linspace(0.0, growing, len(clean.before.horizons_s))
+    rows = 0.1 * (1.0 + steps)[:, None] * np.nanstd(clean.windows.measured[..., :3], axis=(0, 1))
+    drawn: list[tuple[float, float]] = []
+
+    def limits(figure, **_: object) -> str:
+        drawn.extend((axes.get_ylim()[1], float(axes.dataLim.intervaly[1])) for axes in figure.axes)
+        return ""
+
+    monkeypatch.setattr(diagnosis_figures, "svg", limits)
+    before = replace(clean.before, growth=rows)
+    diagnosis_figures.growth_figure(replace(clean, before=before, after=before))
+    assert len(drawn) == 3
+    assert all(bool(top > 1.1 * largest) is (growing < 1e6) for top, largest in drawn)
+
+
 def test_slopes_of_straight_errors_are_exact_whatever_is_missing():
     error = 3.0 + 0.5 * 0.2 * np.arange(10)[None, :, None] * np.ones((2, 10, 3))
     error[0, [0, 4, 9], 1] = np.nan

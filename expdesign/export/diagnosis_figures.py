@@ -219,7 +219,9 @@ def growth_figure(found: Diagnosis) -> str:
         axes.set_xticks(found.before.horizons_s, [f"{value:g}" for value in found.before.horizons_s])
         axes.minorticks_off()
         spread = factor * float(np.nanstd(found.windows.measured[..., OUTPUTS.index(output)]))
-        _, top = axes.get_ylim()
+        # autoscale leaves a margin of the range of values, which of a level line is none: it seemed to leave the figure
+        high = float(axes.dataLim.intervaly[1])
+        top = 1.15 * high if high > 0.0 else 1.0
         axes.set_ylim(0.0, min(top, MOST_SPREADS * spread) if spread > 0 else top)
         axes.set_title(f"error of {label}")
         axes.set_xlabel("time since the start [s]")
