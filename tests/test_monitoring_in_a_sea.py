@@ -329,6 +329,14 @@ def test_a_diagnosis_takes_over_what_the_alarm_named(vessel: Vessel, tmp_path: P
     assert with_alarms(vessel, [tmp_path / "since-change.csv"])[1] == {}
 
 
+def test_sizes_of_what_an_alarm_named_are_told_as_the_watch_tells_them() -> None:
+    drag = Suspected(effect="theta:X_uu", value=-5.7e-4, std=1.6e-5, p_value=1e-4, whole=-0.004)
+    assert "X_uu by -0.00057 ± 1.6e-05 (14.25 ± 0.40 %)," in drag.in_words
+    rudder = Suspected(effect="offset:rudder", value=0.03534, std=0.00038, p_value=1e-4)
+    assert "rudder by 0.03534 ± 0.00038 rad (2.025 ± 0.022 degrees)," in rudder.in_words
+    assert "(" not in Suspected(effect="gain", value=-0.1, std=0.01, p_value=1e-4).in_words
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("effect", ["gain", "theta:N_ur"])
 def test_a_verdict_begins_with_what_an_alarm_named_where_the_data_show_it(vessel: Vessel, effect: str) -> None:

@@ -204,7 +204,7 @@ def load_document(content: LoadContent) -> Document:
         facts={
             "runs": int(plan.repeats.sum()),
             "efficiency": plan.chosen.efficiency,
-            "smallest_relative_sensitivity": float(plan.chosen.smallest),
+            "smallest_relative_sensitivity": float(f"{plan.chosen.smallest:.2g}"),
         },
         values={
             "scenario": content.scenario,

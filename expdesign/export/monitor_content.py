@@ -14,7 +14,6 @@ from expdesign.export.words import HOUR, counted, hours, percent, times, told_ap
 from expdesign.monitoring import (
     AS_LIKELY,
     EQUATIONS,
-    TOLD_APART,
     Alarm,
     Calibration,
     Call,
@@ -211,8 +210,8 @@ def _windy(content: MonitorContent) -> str:
     state, known = content.state, content.calibration
     return (
         f"{hours(state.wind_s)} were not judged: there the measured wind was stronger than in the reference, or came "
-        "from where none came in it, so that the reference tells less than half as well as ever within it what the "
-        f"wind does. The air passed the ship at up to {state.windiest_mps:.3g} m/s, in the reference at up "
+        "from where none came in it, so that what it does to the ship was known less than half as well as anywhere in "
+        f"the reference. The air passed the ship at up to {state.windiest_mps:.3g} m/s, in the reference at up "
         f"to {known.wind_mps:.3g} (means of stretches)."
     )
 
@@ -339,12 +338,8 @@ def alike(content: MonitorContent, number: int) -> list[str]:
 
 
 def delay_s(content: MonitorContent, number: int) -> float:
-    """Expected time to the alarm after a change of its size [s], in data like the reference.
-
-    It is no shorter than the fewest stretches by which a change of the ship is told from weather.
-    """
-    stretches = max(float(soonest(content.calibration.rate[number], content.limit)), TOLD_APART[0])
-    return stretches * content.calibration.stretch_s
+    """Expected time to the alarm after a change of its size [s], in data like the reference."""
+    return float(soonest(content.calibration.rate[number], content.limit)) * content.calibration.stretch_s
 
 
 def monitor_header(content: MonitorContent) -> tuple[str, ...]:

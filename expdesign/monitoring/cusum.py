@@ -104,10 +104,13 @@ def threshold(watched: int, stretches: float) -> float:
 
 
 def soonest(rate: Array, limit: float) -> Array:
-    """Stretches from a change of the size that matters to its alarm, on average, for information of each (...)."""
+    """Stretches from a change of the size that matters to its alarm, on average, for information of each (...).
+
+    They are no fewer than a change of the ship is told from weather by.
+    """
     grows = rate * TUNED_TO * (1.0 - TUNED_TO / 2.0)
     with np.errstate(divide="ignore"):
-        return np.asarray(np.where(grows > 0, np.ceil(limit / grows), np.inf))
+        return np.asarray(np.where(grows > 0, np.maximum(np.ceil(limit / grows), TOLD_APART[0]), np.inf))
 
 
 def watch(

@@ -5,6 +5,7 @@ What was named beforehand is one question, whose p-value needs no allowance for 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -31,6 +32,7 @@ class Suspected:
     value: float  # estimate of its change; std: standard error
     std: float
     p_value: float  # of the vessel file without it; not adjusted, as it is one question
+    whole: float = 0.0  # the file's value of a parameter; zero for other effects
 
     @property
     def confirmed(self) -> bool:
@@ -42,6 +44,9 @@ class Suspected:
         """The outcome."""
         unit = effect_row(self.effect).unit
         size = f"{rounded(self.value, self.std)}{' ' * bool(unit)}{unit}"
+        if self.whole or unit == "rad":  # as a watch tells it
+            factor, other = (100.0 / self.whole, "%") if self.whole else (math.degrees(1.0), "degrees")
+            size += f" ({rounded(factor * self.value, abs(factor) * self.std)} {other})"
         answer = "the data show it" if self.confirmed else "the data do not show it"
         name, chance = self.effect.removeprefix("theta:"), max(self.p_value, LEAST_P)
         return f"tested first and alone, {answer}: {name} by {size}, p {'=' if chance > LEAST_P else '<'} {chance:.2g}"
@@ -69,7 +74,9 @@ def _fitted(base: Fit, windows: Windows, test: ScoreTest) -> Suspected:
     found = fit(base.ship, windows, (key,), starts=base.starts)
     value, place = found.value(key) - base.ship.get(key), found.keys.index(key)
     std = float(np.sqrt(found.covariance[place, place]))
+    named = key.removeprefix("theta:")
+    whole = dict(zip(base.ship.model.names, base.ship.model.parameters.tolist(), strict=True)).get(named, 0.0)
     return Suspected(
-        effect=key, value=value, std=std * float(np.sqrt(test.factor)),
+        effect=key, whole=whole if key != named else 0.0, value=value, std=std * float(np.sqrt(test.factor)),
         p_value=tail((value / std) ** 2, 1, test.factor, test.freedom),
     )  # fmt: skip
