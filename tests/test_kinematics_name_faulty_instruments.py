@@ -304,6 +304,27 @@ def test_the_rudder_sign_is_the_vessel_files_and_no_convention(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("names", [NAMES, POSE])
+@pytest.mark.parametrize("kind", ["random", "circle"])
+@pytest.mark.parametrize(("axis", "scale"), [("north_m", 1 / 0.3048), ("east_m", 1 / 0.3048), ("east_m", 2.0)])
+def test_an_axis_of_positions_in_another_unit_is_named_and_no_log_is_mended_by_it(
+    tmp_path: Path, ship: Vessel, axis: str, scale: float, kind: str, names: tuple[str, ...]
+) -> None:
+    """Velocities that were right were divided by 0.37; from positions alone nothing was said."""
+    ratio, told = scale if axis == "east_m" else 1 / scale, 0
+    for log in voyages(4, kind, gust=0.5):
+        log[axis] = scale * log[axis]
+        found = findings(tmp_path, log, ship, names).get("position_axes")
+        if found is None:
+            continue
+        told += 1
+        assert abs(found.value / ratio - 1.0) < 0.15
+        record = read(tmp_path, log, ship, names)
+        assert record.doubts[0].startswith("log.csv: positions move")
+        assert not any("Here it is" in text or "Here that is" in text for text in record.doubts)
+    assert told == 4 if kind == "circle" else told >= 2  # a random track may bend too little to tell
+
+
+@pytest.mark.parametrize("names", [NAMES, POSE])
 @pytest.mark.parametrize("kind", ["zigzag", "random", "circle"])
 def test_course_taken_for_heading_is_recognised(
     tmp_path: Path, ship: Vessel, kind: str, names: tuple[str, ...]

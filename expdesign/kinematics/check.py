@@ -29,6 +29,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS, plus_minus
 from expdesign.errors import InputError
 from expdesign.estimation.regression import inputs_of, model_for
+from expdesign.kinematics.axes import axes_of_positions
 from expdesign.kinematics.held import Held, held, knots_held
 from expdesign.kinematics.instruments import (
     Finding,
@@ -193,7 +194,7 @@ OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_
 LATE = "velocity_delay_s"  # a finding that is undone where it is positive: then one instrument is late by two others
 OF_LOG = (
     *(row.key for row in GAINS_AND_OFFSETS if row.shown_by == LOG),
-    *(LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m"),
+    *(LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m", "position_axes"),
 )
 """Findings of the same comparison, which one that stands may imitate."""
 
@@ -351,9 +352,13 @@ def _file(batch: Batch) -> str:
 
 def _disagreements(batches: Sequence[Batch], vessel: Vessel, model: VesselModel) -> Iterator[Finding]:
     length_m = vessel.length_m
+    axes = list(axes_of_positions(batches, length_m=length_m))
+    yield from axes
     course = list(course_as_heading(batches, length_m=length_m, drifts=drifts(batches, model, length_m)))
-    yield from course
-    if not course:
+    yield from () if axes else course
+    if axes:  # they tell nothing of a log
+        yield from gyro_against_heading(batches, length_m=length_m)
+    elif not course:
         gyro = list(gyro_against_heading(batches, length_m=length_m))
         yield from gyro
         late_s = max(0.0, -sum(item.value for item in gyro if item.name == "yaw_rate_delay_s"))
