@@ -175,13 +175,18 @@ def roll(seeds: range, only: str = "") -> Iterator[tuple[str, str]]:
                 continue
             inside += low <= sea.load[0] <= high
             errors.append(value - sea.load[0])
-            others += [abs(z) < 1.96 for z in deviations(one)]
-            heights += [abs(z) < 1.96 for z in height_deviations(one, sea)]
+            others.append(np.mean(np.abs(deviations(one)) < 1.96))
+            heights.append(np.mean(np.abs(height_deviations(one, sea)) < 1.96))
         rms = f", error {np.sqrt(np.mean(np.square(errors))):.0f} kg rms" if errors else ""
         if others:
-            rms += f"; inside 95 %: other parameters {np.mean(others):.0%}, metacentric heights {np.mean(heights):.0%}"
+            rms += f"; inside 95 %: other parameters {_share(others)}, metacentric heights {_share(heights)}"
         said = f"rudder said to answer in {answers}"
         yield name, f"trusted {trusted} of {len(seeds)}, load inside in {inside}{rms}; {said}"
+
+
+def _share(trials: list[float]) -> str:
+    """Mean of shares of trials, and its standard error between these: errors of one trial go together."""
+    return f"{np.mean(trials):.0%} ± {np.std(trials, ddof=1) / np.sqrt(len(trials)):.0%}"
 
 
 STUDIES = {"steps": steps, "holds": holds, "watch": watch, "roll": roll}
