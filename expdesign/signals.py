@@ -187,6 +187,7 @@ class Record:
     batches: tuple[Batch, ...]  # with the same inputs and the same sample time
     notes: tuple[str, ...] = ()  # on flaws of the files and their treatment, one sentence each
     doubts: tuple[str, ...] = ()  # those of the notes that put results into question, whatever is done with the data
+    idle: tuple[str, ...] = ()  # those of the notes that concern estimates alone: inputs that never move
     faults: tuple[str, ...] = ()  # those of the doubts that stand in the data as they are used
     # effect of `vessel.quantities` -> least and greatest value of it that instruments show of each other
     shown: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -29,6 +29,7 @@ from expdesign.vessel import Actuator, Limit, Response, Vessel
 from measured_trials import TUG, TUG_TRUE, as_batch, quiet, write_run
 from nomoto_ship import nomoto_ship
 from sample_files import OUTSIDE, outside
+from synthetic_ship import sail, vessel_file, write
 from vessel_files import ESSO_WIND, KVLCC2, write_vessel
 
 SHIP = replace(nomoto_ship(sense=1.0), length_m=50.0)
@@ -467,3 +468,17 @@ def test_field_records_that_begin_late_give_what_the_whole_ones_give() -> None:
     assert read("rudder-rate/zz20-act.csv").overshoots_rad == pytest.approx(whole.overshoots_rad, abs=math.radians(0.1))
     circles = read("rudder-rate/tc35.csv"), read("no-approach/tc35-late.csv")
     assert circles[1].steady_diameter_m == pytest.approx(circles[0].steady_diameter_m, rel=0.01)
+
+
+def test_inputs_that_never_move_are_noted_where_something_is_estimated_and_not_by_indices(tmp_path: Path) -> None:
+    """Every standard trial holds the engines; a page of indices said of each that effects cannot be estimated."""
+    data = write(tmp_path / "trial.csv", sail(np.column_stack([np.full(300, 3.0), np.repeat([0.0, 0.5], [60, 240])])))
+    ship = vessel_file(tmp_path / "ship.toml")
+    said = {}
+    for command, more in (("indices", []), ("estimate", ["--fixed", "X_nn", "X_uu", "--method", "ls"])):
+        call = [command, str(data), "--vessel", str(ship), "--out", str(tmp_path / command), *more]
+        assert main([*call, "--quiet"]) == 0
+        said[command] = (tmp_path / command / f"{command}.html").read_text(encoding="utf-8")
+    assert "in all rows" in said["estimate"]
+    assert "in all rows" not in said["indices"]
+    assert "advance" in said["indices"]

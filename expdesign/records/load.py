@@ -213,8 +213,9 @@ def load_records(
         (header, value), *others = levels
         if header and not others:  # another file may tell what one does not
             idle.setdefault(value, []).append(header)
-    notes |= {_idle_note(headers, value): list(files.values()) for value, headers in idle.items()}
-    return Record(batches=tuple(batches), notes=tuple(f"{_listed(names)}: {note}" for note, names in notes.items()))
+    still = tuple(f"{_listed([*files.values()])}: {_idle_note(headers, value)}" for value, headers in idle.items())
+    told = tuple(f"{_listed(names)}: {note}" for note, names in notes.items())
+    return Record(batches=tuple(batches), notes=(*told, *still), idle=still)
 
 
 def _standing(table: Table, column: str) -> tuple[str, str]:

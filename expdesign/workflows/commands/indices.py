@@ -75,7 +75,7 @@ def _measured(
         record = at_reference_point(measured([path], ship), ship.sensors)
         seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
         doubts += record.doubts
-        notes += (note for note in record.notes if note not in record.doubts)
+        notes += (note for note in record.notes if note not in (*record.doubts, *record.idle))
     return tuple(seen), (*doubts, *notes)
 
 
