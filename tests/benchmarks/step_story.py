@@ -52,7 +52,7 @@ def sailed(folder: Path, runs: Sequence[Primitive], rng: np.random.Generator) ->
 
 def chosen(case: Scenario, dictionary: str, vessel: Vessel) -> list[Primitive]:
     """The whole runs of a dictionary that tell most in `DESIGNED_S` beside what the vessel file knows."""
-    settings = replace(case.design, total_s=DESIGNED_S, required=())
+    settings = replace(case.design, total_s=DESIGNED_S, limits=replace(case.design.limits, required=()))
     specs = load_dictionary(SCENARIOS / "dictionaries" / dictionary)
     now = replace(case, vessel=vessel, dictionary=specs, design=settings)
     information = scored(now)
