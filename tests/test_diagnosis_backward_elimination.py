@@ -162,7 +162,10 @@ def test_rejected_causes_are_noted_with_their_tests():
     ]
     (note,) = notes_on_rejected(found, replace(kept, last_tests=tuple(left)), "runs")
     assert "a sign of a current (p = 0.0001). It is not a finding" in note
-    for names, words in (((), "wrong values of some parameters"), (("N_r",), "a wrong value of N_r")):
+    for names, words in (
+        ((), "values of some parameters unlike the file's"),
+        (("N_r",), "a value of N_r unlike the file's"),
+    ):
         (step,) = steps_of("one").steps
         step.chosen.candidate, step.chosen.parameters = Candidate(cause="parameters", free={"one": 0.0}), names
         tests = (ScoreTest(candidate=step.chosen.candidate, statistic=0.0, p_value=1e-4, step=np.zeros(1)),)

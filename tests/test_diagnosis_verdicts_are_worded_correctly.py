@@ -10,7 +10,7 @@ from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.conclusions.findings import error_reductions_of, note_on_random_current
-from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, remarks, verdict
+from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, as_sign, remarks, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding, Lead, Unexplained
@@ -27,6 +27,7 @@ BEFORE = Accuracy(
 
 
 REDUCTIONS = ((0.1, 0.0, 0.2), (0.5, 0.42, 0.58), (0.0, -0.1, 0.1))
+REDUCTION_AHEAD = ErrorReduction(output="all", share=0.13, low=0.06, high=0.19)
 
 
 def varying(std_mps: float, time_s: float) -> Noise:
@@ -115,9 +116,8 @@ def test_a_gain_is_told_by_the_output_that_improves_most_of_those_that_surely_do
 def test_what_shows_in_predictions_alone_is_in_the_record_and_not_lacking_in_simulations():
     """Beside what simulations show, too, and several with one verb."""
     open_ones = ((0.2, -0.2, 0.5), (0.0, -2.0, 0.7), (0.1, -1.0, 0.6))
-    ahead = ErrorReduction(output="all", share=0.13, low=0.06, high=0.19)
     delay, gyro = (
-        replace(finding(cause, error_reductions=open_ones), predicted=ahead)
+        replace(finding(cause, error_reductions=open_ones), predicted=REDUCTION_AHEAD)
         for cause in ("actuator_delay", "gyro_scale")
     )
     late, scale = "the dead time of the actuators", "the scale of the rate gyro"
@@ -131,6 +131,31 @@ def test_what_shows_in_predictions_alone_is_in_the_record_and_not_lacking_in_sim
         f"The simulation lacks wind; the record shows {late}, {open_still}. "
     )
     assert f"{late} and {scale}, but whether simulations get better with them" in verdict([delay, gyro], BEFORE)
+
+
+@pytest.mark.parametrize("name", MISSING_EFFECTS)
+def test_only_what_the_simulation_lacks_for_certain_is_called_correct(name):
+    """Not what a record shows in predictions alone, a candidate, what was refused, or other answers to these."""
+    shown = replace(finding(name, error_reductions=((0.2, -0.2, 0.5),) * 3), predicted=REDUCTION_AHEAD)
+    others = replace(finding("roll_coupling", alternatives=[name]), predicted=REDUCTION_AHEAD)
+    lead = Lead(name, 0.5, (-0.6, 1.2))
+    told = [verdict([shown], BEFORE), verdict([shown, others], BEFORE), verdict([], BEFORE, signs=(lead,))]
+    told += remarks("runs", None, (lead,), (name,), ())
+    assert not [text for text in told if "correct " in text.replace("Correct the instruments", "")]
+    assert all(as_sign(MISSING_EFFECTS[name]) in text for text in told)
+    assert f"lacks {MISSING_EFFECTS[name]}." in verdict([finding(name)], BEFORE)
+
+
+def test_values_that_a_record_shows_are_those_that_the_file_does_not_have():
+    """Of the file's own the numbers are not; every one of several has its name."""
+    u, r = (Estimate(name=name, value=-0.5, std=0.01, unit="", stated=-0.3) for name in ("X_u", "N_r"))
+    one = replace(finding("parameters"), keys=("theta:X_u",), estimates=(u,), predicted=REDUCTION_AHEAD)
+    size = "-0.500 \N{PLUS-MINUS SIGN} 0.010, the file says -0.3"
+    assert verdict([one], BEFORE).startswith(f"The record shows a value of X_u unlike the file's ({size}), but whether")
+    two = replace(one, keys=("theta:X_u", "theta:N_r"), estimates=(u, r), predicted=None)
+    assert f"lacks the correct values of X_u and N_r (X_u {size}; N_r {size}). Adding them" in verdict([two], BEFORE)
+    inertia = replace(finding("load_change"), predicted=REDUCTION_AHEAD)
+    assert verdict([inertia], BEFORE).startswith("The record shows an inertia unlike the file's, but whether")
 
 
 def test_a_verdict_without_findings_states_the_accuracy():

@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values, rounded, wind_can_be_told
-from expdesign.diagnosis.conclusions.verdict import effect_in_words, has_diverged, missing_effect
+from expdesign.diagnosis.conclusions.verdict import as_sign, effect_in_words, has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import (
     AHEAD_S,
@@ -206,7 +206,7 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     named = [step.chosen.candidate for step in kept.steps]
     rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
     return tuple(
-        f"The data show a sign of {_sign_of(step)} (p = "
+        f"The data show a sign of {_as_sign(step)} (p = "
         f"{p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off every error, "
         "or its gain or its size may be zero."
         for step in rejected
@@ -214,10 +214,9 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     )
 
 
-def _sign_of(step: Step) -> str:
-    """Missing effect of a cause; values of the file that are not correct are wrong ones."""
-    lacked = missing_effect(step.chosen.candidate.cause, step.chosen.parameters)
-    return lacked.replace("the correct values", "wrong values").replace("the correct", "a wrong")
+def _as_sign(step: Step) -> str:
+    """The effect that a cause is a sign of."""
+    return as_sign(missing_effect(step.chosen.candidate.cause, step.chosen.parameters))
 
 
 def _p_value_left(step: Step, kept: Selection) -> float:
@@ -310,7 +309,7 @@ def note_on_predictions(
         replaced: what the search had found.
     """
     gain, (low, high) = held_out_gain(as_stated, found, seed)
-    names = " and ".join(missing_effect(step.chosen.candidate.cause) for step in replaced)
+    names = " and ".join(map(_as_sign, replaced))
     left = (
         f"found {names}, which leaves much unexplained or may imitate other causes"
         if names

@@ -60,15 +60,27 @@ def effect_in_words(cause: str, keys: Sequence[str]) -> str:
     return f"the offset of the {group} angle" if kind == "offset" else missing_effect(cause, parameters)
 
 
+def as_sign(effect: str) -> str:
+    """What may not be certain is not called correct: of the correct inertia, "an inertia unlike the file's"."""
+    noun = effect.removeprefix("the correct ")
+    article = "" if noun.startswith("values") else "an " if noun[0] in "aeiou" else "a "
+    return effect if noun == effect else f"{article}{noun} unlike the file's"
+
+
+def _of(item: Finding, effect: str) -> str:
+    """An effect as the simulation lacks it, or as the record shows it, which shows no correct values."""
+    return effect if item.predicted is None else as_sign(effect)
+
+
 def lacking(item: Finding) -> str:
     """Missing effect of a finding."""
-    return effect_in_words(item.cause, item.keys)
+    return _of(item, effect_in_words(item.cause, item.keys))
 
 
 def alternatives(item: Finding) -> list[str]:
     """What the data cannot tell from a finding, in words."""
     words = item.alternatives or [missing_effect(name) for name in item.not_distinguishable_from]
-    words = [word for word in dict.fromkeys(words) if word != lacking(item)]
+    words = [word for word in dict.fromkeys(_of(item, word) for word in words) if word != lacking(item)]
     return [*words[:MOST_NAMED], *["others"] * (len(words) > MOST_NAMED)]
 
 
@@ -226,7 +238,7 @@ def _with_sizes(item: Finding) -> str:
         size = plus_minus(one.value, one.std)
         if one.name in TOWARDS:
             size = f"{size} {one.unit} to {TOWARDS[one.name]}"
-        elif not what.endswith(f" {one.name}"):
+        elif len(item.estimates) > 1 or one.name not in what.split():
             size = f"{one.name} {size}"
         sizes.append(f"{size}{says}")
     between = ", " if all(one.stated is None for one in item.estimates) else "; "
@@ -274,7 +286,10 @@ def remarks(
     """
     found = []
     if refused:
-        names, verb = listed([missing_effect(cause) for cause in refused]), "it is" if len(refused) == 1 else "they are"
+        names, verb = (
+            listed([as_sign(missing_effect(cause)) for cause in refused]),
+            "it is" if len(refused) == 1 else "they are",
+        )
         found.append(f"With {names} the simulation of these data would diverge or be worse, so {verb} not written.")
     if instead:
         found.append(f"A cause outside the catalogue explains these data about as well: {listed(instead, 'or')}.")
@@ -328,12 +343,12 @@ def _lead(lead: Lead) -> str:
     low, high = lead.gain_interval
     but = "; but whole runs are simulated worse with it, or too few show it" if low > 0.0 else ""
     gain = f"{lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f}{but}"
-    return f"{missing_effect(lead.cause, lead.parameters)} ({gain})"
+    return f"{as_sign(missing_effect(lead.cause, lead.parameters))} ({gain})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
     if len(findings) == 1:
-        it = "them" if lacking(findings[0]).startswith("the correct values") else "it"
+        it = "them" if lacking(findings[0]).removeprefix("the correct ").startswith("values") else "it"
         return f"Adding {it} {benefit(findings[0])} on {unit} held out of the fit"
     return f"On {unit} held out of the fit, {listed([f'adding {lacking(item)} {benefit(item)}' for item in findings])}"
 
