@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from expdesign.web.folder import MOST_UPLOAD_BYTES
+
 pytestmark = pytest.mark.browser
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -305,6 +307,46 @@ def test_what_is_wrong_in_a_file_is_said_in_the_page(page, folder: Path) -> None
         page.locator(".wrong", has_text="elsewhere.toml").first.wait_for()
 
 
+def test_what_cannot_be_written_is_said_on_every_page(page, folder: Path) -> None:
+    first = {path: path.read_text() for path in folder.rglob("*.toml")}
+    for name in (".expdesign", "logs"):
+        (folder / name).write_text("a file where a folder is needed")
+    told = page.locator(".q-notification", has_text="cannot be written")
+
+    page.goto("/sea")
+    page.get_by_text("Start, goal and plan as numbers").click()
+    page.get_by_text("[plan]", exact=True).click()
+    clearance = page.get_by_label("clearance_m").first
+    clearance.fill("7")
+    clearance.blur()
+    page.locator(".wrong", has_text="cannot be written").wait_for()
+
+    page.goto("/files?file=craft/scenario.toml")
+    page.locator(".cm-content").click()
+    page.keyboard.type("# more\n")
+    page.get_by_role("button", name="Write").click()
+    told.wait_for()
+
+    page.goto("/manoeuvres")
+    page.locator(".run").first.get_by_role("checkbox").click()
+    told.wait_for()
+
+    page.goto("/data")
+    page.locator("input[type=file]").set_input_files(str(SCENARIOS / "logs/bridge.csv"))
+    told.wait_for()
+    assert {path: path.read_text() for path in folder.rglob("*.toml")} == first
+
+
+def test_a_file_that_is_too_large_is_told(page, folder: Path, tmp_path: Path) -> None:
+    large = tmp_path / "day.csv"
+    with large.open("wb") as file:
+        file.truncate(MOST_UPLOAD_BYTES + 1)  # takes no room
+    for screen, beside in (("data", "logs"), ("sea", "craft")):
+        page.goto(f"/{screen}")
+        page.locator("input[type=file]").set_input_files(str(large))
+        page.locator(".q-notification", has_text=f"copy it into {folder / beside}").wait_for()
+
+
 CONTRASTS = """() => {
     const parts = (colour) => colour.match(/[\\d.]+/g).map((x) => (colour.startsWith("color(") ? 255 : 1) * x);
     const light = (colour) => parts(colour).slice(0, 3).map((x) => x / 255)
@@ -314,7 +356,7 @@ CONTRASTS = """() => {
         const colour = getComputedStyle(e).backgroundColor;
         if (parts(colour)[3] !== 0) return colour; } return "rgb(255, 255, 255)"; };
     return [...document.querySelectorAll("button, a, .quiet, .wrong, .good, .help")]
-        .filter((e) => e.checkVisibility() && e.innerText && !e.closest(".leaflet-control, .unused, .q-uploader"))
+        .filter((e) => e.checkVisibility() && e.innerText && !e.closest(".leaflet-control, .unused"))
         .map((e) => { const [a, b] = [light(getComputedStyle(e).color), light(behind(e))].sort((x, y) => y - x);
             return [e.innerText, (a + 0.05) / (b + 0.05)]; })
         .filter(([, ratio]) => ratio < 4.5); }"""

@@ -1,6 +1,8 @@
 """The page reads and writes one folder, lets in who may, keeps versions, and makes forms of what reads the files."""
 
 import asyncio
+import errno
+import os
 import re
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.web.answers import change_in, clearance_of, durations_of, ends_of, problem_of
 from expdesign.web.folder import MOST_VERSIONS, Folder
 from expdesign.web.forms import put
-from expdesign.web.jobs import Jobs
+from expdesign.web.jobs import Job, Jobs
 from expdesign.web.server import Gate
 from expdesign.workflows import new
 
@@ -70,6 +72,56 @@ def test_a_file_handed_over_replaces_no_other(folder: Folder) -> None:
     assert folder.take_in("log.csv", b"one") == "log.csv"
     assert folder.take_in("log.csv", b"two") == "log-2.csv"
     assert folder.path("log.csv").read_bytes() == b"one"
+
+
+def test_names_that_downloads_and_loggers_give_are_taken(folder: Folder) -> None:
+    for name in ("log (1).csv", "Übung 3, Süd.csv", "_50% #2 [b].csv", "zig+zag&circle's.nmea"):
+        assert folder.take_in(name, b"x", beside=Path("logs")) == f"logs/{name}"
+    for name in ("", "..", ".hidden", "-o.csv", "a/b.csv", "a\\b.csv", "a\n.csv", "a\0.csv", 121 * "a" + ".csv"):
+        with pytest.raises(InputError, match="is not taken"):
+            folder.take_in(name, b"x")
+
+
+def test_what_is_no_file_is_left_out(folder: Folder) -> None:
+    folder.write("a.toml", "[ship]\n[thrusters]\n")
+    folder.path("gone.toml").symlink_to(folder.root / "nothing.toml")
+    os.mkfifo(folder.root / "pipe.toml")
+    assert [path.name for path in folder.files()] == ["a.toml"]
+    assert folder.of_kind("card") == ("a.toml",)
+
+
+WRITES = {
+    "a new file": lambda folder: folder.write("b.toml", "n = 2\n"),
+    "an old file": lambda folder: folder.write("a.toml", "n = 2\n"),
+    "a key": lambda folder: folder.change("a.toml", lambda tables: tables.__setitem__("n", 2)),
+    "an earlier version": lambda folder: folder.undo("a.toml"),
+    "a file handed over": lambda folder: folder.take_in("log.csv", b"n = 2\n"),
+}
+
+
+@pytest.mark.parametrize(
+    ("written", "parts"),
+    [*((name, 0) for name in WRITES), ("an old file", 1), ("a key", 1)],  # these keep a version
+)
+def test_a_full_disk_is_told_and_leaves_all_as_it_was(
+    folder: Folder, written: str, parts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for text in ("n = 0\n", "n = 1\n"):
+        folder.write("a.toml", text)
+    before = {path: path.read_bytes() for path in folder.root.rglob("*") if path.is_file()}
+    plain, done = Path.write_bytes, []
+
+    def full(path: Path, content: bytes) -> int:
+        done.append(path)
+        if len(done) > parts:
+            plain(path, content[:2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return plain(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputError, match=r"(a|b|log)\.(toml|csv): cannot be written: No space left on device"):
+        WRITES[written](folder)
+    assert {path: path.read_bytes() for path in folder.root.rglob("*") if path.is_file()} == before
 
 
 def asked(gate: Gate, *, host: str, origin: str = "", token: str = "", cookie: str = "", kind: str = "http") -> int:
@@ -167,6 +219,17 @@ def test_commands_run_report_and_stop(tmp_path: Path) -> None:
         assert made.command == "expdesign new craft --kind asv"
 
     asyncio.run(work())
+
+
+def test_results_of_an_earlier_command_are_not_shown_as_those_of_this_one(tmp_path: Path) -> None:
+    page = tmp_path / "estimate.html"
+    page.write_text("of before")
+    job = Job(requests.New(folder=Path("craft"), kind="asv"), tmp_path)
+    os.utime(page, (job.asked_s - 5.0, job.asked_s - 5.0))
+    assert not job.wrote("estimate.html")
+    assert not job.wrote("nothing.html")
+    page.write_text("of this one")
+    assert job.wrote("estimate.html")
 
 
 def test_answers_are_those_of_the_commands(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator, MutableMapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ VERSIONS = ".expdesign"  # folder of earlier versions
 MOST_VERSIONS = 100  # kept of each file
 MOST_UPLOAD_BYTES = 200 * 2**20  # size of a file that is taken in
 MOST_FILES = 5000  # looked through for files of a kind
-NAME = re.compile(r"[A-Za-z0-9][\w. -]{0,80}")  # names of files that are taken in
+NAME = re.compile(r"[^-. /\\\0-\x1f\x7f][^/\\\0-\x1f\x7f]{0,120}")  # names of files that are taken in
 KINDS = {
     "scenario": ("scenario", "design"),
     "vessel": ("vessel", "model"),
@@ -59,14 +60,14 @@ class Folder:
         return self.path(os.path.relpath(file.parent / named, self.root))
 
     def files(self) -> Iterator[Path]:
-        """Files of the folder and its folders, by name; hidden ones are left out."""
+        """Files of the folder and its folders, by name; hidden ones, links to nothing and pipes are left out."""
         count = 0
         for base, folders, names in os.walk(self.root):
             folders[:] = sorted(name for name in folders if not name.startswith("."))
             for path in (Path(base) / name for name in sorted(names) if not name.startswith(".")):
                 if count == MOST_FILES:
                     return
-                if path.resolve().is_relative_to(self.root):
+                if path.is_file() and path.resolve().is_relative_to(self.root):
                     count += 1
                     yield path
 
@@ -101,20 +102,26 @@ class Folder:
             return ""
 
     def write(self, name: str, text: str) -> None:
-        """Write a file as a whole and keep what stood there as a version."""
+        """Write a file as a whole and keep what stood there as a version.
+
+        Raises:
+            FileError: the folder or its disk takes nothing.
+        """
         path = self.path(name)
-        if path.exists():
-            before = path.read_bytes()
-            if before == text.encode():
-                return
-            kept = self._versions(path)
-            number = int(kept[-1].name) + 1 if kept else 1
-            folder = self._of_versions(path)
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / f"{number:06d}").write_bytes(before)
-            for old in kept[: max(0, len(kept) + 1 - MOST_VERSIONS)]:
-                old.unlink()
-        _replace(path, text.encode())
+        with _writing(path):
+            if not path.exists():
+                _replace(path, text.encode())
+            elif (before := path.read_bytes()) != text.encode():
+                kept = self._versions(path)
+                version = self._of_versions(path) / f"{int(kept[-1].name) + 1 if kept else 1:06d}"
+                _replace(version, before)
+                try:
+                    _replace(path, text.encode())
+                except OSError:
+                    version.unlink()
+                    raise
+                for old in kept[: max(0, len(kept) + 1 - MOST_VERSIONS)]:
+                    old.unlink()
 
     def versions(self, name: str) -> int:
         """How often a file can be undone."""
@@ -138,14 +145,15 @@ class Folder:
         """Take the newest version of a file back.
 
         Raises:
-            InputError: there is none.
+            InputError: there is none, or it cannot be written.
         """
         path = self.path(name)
         kept = self._versions(path)
         if not kept:
             raise InputError(f"{name} has no earlier version")
-        _replace(path, kept[-1].read_bytes())
-        kept[-1].unlink()
+        with _writing(path):
+            _replace(path, kept[-1].read_bytes())
+            kept[-1].unlink()
 
     def change(self, name: str, edit: Callable[[MutableMapping[str, Any]], None]) -> None:
         """Change a TOML file; its comments and order stay.
@@ -154,7 +162,7 @@ class Folder:
             edit: changes the tables in place.
 
         Raises:
-            FileError: it is not TOML.
+            FileError: it is not TOML, or cannot be written.
         """
         path = self.path(name)
         try:
@@ -168,19 +176,20 @@ class Folder:
         """Write a file that was handed over into a folder; its name, with a number where the name is taken.
 
         Raises:
-            InputError: its name is no plain file name, or it is too large.
+            InputError: its name is no plain file name, it is too large, or it cannot be written.
         """
         if not NAME.fullmatch(name):
-            raise InputError(f"the file name {name[:80]!r} is not taken, expected letters, digits, '-', '_' and '.'")
+            raise InputError(f"the file name {name[:80]!r} is not taken, expected at most 120 letters, no '.' first")
         if len(content) > MOST_UPLOAD_BYTES:
             raise InputError(
                 f"{name} has {len(content) / 2**20:.0f} MiB, expected at most {MOST_UPLOAD_BYTES // 2**20}"
             )
         path, number = self.path(beside / name), 1
-        while path.exists() and path.read_bytes() != content:
-            number += 1
-            path = self.path(beside / f"{Path(name).stem}-{number}{Path(name).suffix}")
-        _replace(path, content)
+        with _writing(path):
+            while path.exists() and path.read_bytes() != content:
+                number += 1
+                path = self.path(beside / f"{Path(name).stem}-{number}{Path(name).suffix}")
+            _replace(path, content)
         return self.name(path)
 
     def _of_versions(self, path: Path) -> Path:
@@ -191,9 +200,22 @@ class Folder:
         return sorted(item for item in folder.iterdir() if item.name.isdigit()) if folder.is_dir() else []
 
 
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Say of which file and why, where nothing can be written."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(path, "", f"cannot be written: {error.strerror or error}") from None
+
+
 def _replace(path: Path, content: bytes) -> None:
     """Write a whole file or none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.new")
-    beside.write_bytes(content)
-    beside.replace(path)
+    try:
+        beside.write_bytes(content)
+        beside.replace(path)
+    except OSError:
+        beside.unlink(missing_ok=True)  # of a full disk
+        raise

@@ -190,7 +190,7 @@ class Form:
             self._check(tables, Entry(file))
             self._folder.change(self._name, lambda content: put(content, path, value))
         except FileError as error:
-            return f"{error.key}: {error.problem}"
+            return f"{error.key}: {error.problem}" if error.key else str(error)
         self._tables = tables
         self._changed()
         return ""

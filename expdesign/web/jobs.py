@@ -10,6 +10,7 @@ import re
 import shlex
 import signal
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +20,7 @@ PROGRESS = re.compile(r"\[\s*(\d+)%\] (.*)")  # a line of progress: share and ac
 MOST_LINES = 2000  # kept of an output
 MOST_JOBS = 2  # at work at once; later ones wait
 INTERRUPTED = 130
+CLOCK_S = 0.1  # by which times of files lag behind the clock at most
 
 
 @dataclass(eq=False)
@@ -34,6 +36,7 @@ class Job:
     status: int | None = None  # exit status; None before the end
     process: asyncio.subprocess.Process | None = None
     stopped: bool = False  # by the user
+    asked_s: float = field(default_factory=time.time)  # when it was asked for
 
     @property
     def command(self) -> str:
@@ -44,6 +47,11 @@ class Job:
     def out(self) -> str:
         """Folder of its results, in the folder in which it runs."""
         return str(getattr(self.request, "out", None) or "")
+
+    def wrote(self, name: str) -> bool:
+        """Whether a file of the folder is as new as this command."""
+        path = self.folder / name
+        return path.is_file() and path.stat().st_mtime >= self.asked_s - CLOCK_S
 
     @property
     def state(self) -> str:

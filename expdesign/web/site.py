@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
 from inspect import isawaitable
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from nicegui import ui
+from nicegui import events, ui
 
 from expdesign.errors import InputError
 from expdesign.web import answers
-from expdesign.web.folder import Folder
+from expdesign.web.folder import MOST_UPLOAD_BYTES, Folder
 from expdesign.web.jobs import Job, Jobs
 
 PAGES = (
@@ -90,7 +91,7 @@ class Site:
                     found = draw(*arguments, **options)
                     if isawaitable(found):
                         await found
-                except InputError as error:
+                except (InputError, OSError) as error:
                     wrong(str(error))
                     ui.label("The page Files shows it as text.").classes("quiet")
 
@@ -142,6 +143,7 @@ def framed(site: Site, here: str, scenario: str) -> Iterator[Watched]:
         '<link rel="stylesheet" href="/static/page.css"><script src="/static/chart.js"></script>', shared=False
     )
     ui.colors(primary=PRIMARY, negative=NEGATIVE)
+    ui.on_exception(failed)
     dark = ui.dark_mode(site.night)
 
     def switch() -> None:
@@ -182,6 +184,27 @@ def told(place: ui.element, answer: answers.Answer) -> bool:
 def wrong(text: str) -> None:
     """One line on what is wrong, which a screen reader says at once."""
     ui.label(text).classes("wrong").props('role="alert"')
+
+
+def failed(error: Exception) -> None:
+    """Say what an action came to nothing by, until it is closed; it would seem done."""
+    text = str(error) if isinstance(error, InputError | OSError) else f"failed, a defect: {error!r}"
+    ui.notify(text, type="negative", timeout=0, close_button="Close", multi_line=True)
+
+
+def dropped(
+    label: str, take: Callable[[events.UploadEventArguments], Awaitable[None]], *, beside: Path, multiple: bool = False
+) -> None:
+    """A place to drop files on, or to choose them; of those that are too large it says where to copy them to."""
+
+    def refused() -> None:
+        most = MOST_UPLOAD_BYTES // 2**20
+        failed(InputError(f"not taken, more than {most} MiB: copy it into {beside} and load this page again"))
+
+    ui.upload(
+        label=f"{label}, or press +", multiple=multiple, auto_upload=True, max_file_size=MOST_UPLOAD_BYTES,
+        on_upload=take, on_rejected=refused,
+    ).classes("upload")  # fmt: skip
 
 
 def spelled(command: str, note: str = "") -> None:

@@ -8,9 +8,8 @@ from nicegui import events, ui
 
 from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.jobs import Job
-from expdesign.web.site import Site, framed, page_of, shown_job, wrong
+from expdesign.web.site import Site, dropped, framed, page_of, shown_job, wrong
 
 LOGS = "logs"  # folder of logs that were dropped in
 PAGES = {
@@ -48,9 +47,7 @@ class _Data:
         """Logs, runs, commands, results."""
         ui.label("1. Logs").classes("head2")
         ui.label("Drop logs of any format here; together they are one trial.").classes("quiet")
-        ui.upload(
-            label="Drop logs", multiple=True, auto_upload=True, max_file_size=MOST_UPLOAD_BYTES, on_upload=self._take
-        ).classes("upload")
+        dropped("Drop logs", self._take, beside=self.site.folder.root / LOGS, multiple=True)
         self.logs = ui.select(list(self._logs()), multiple=True, label="Logs to import", value=[]).classes("field")
         ui.button("Import", on_click=self._import)
         ui.label("2. Runs").classes("head2")
@@ -146,7 +143,7 @@ class _Data:
 
     def _ended(self, job: Job) -> None:
         page = f"{job.out}/{PAGES[type(job.request)]}"
-        if self.site.folder.path(page).is_file():
+        if job.wrote(page):  # else it is of an earlier command
             with self.place:
                 page_of(page)
         if isinstance(job.request, requests.Import) and job.status == 0:

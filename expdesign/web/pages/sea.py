@@ -16,9 +16,8 @@ from expdesign.scenario.charts.zones import AreaTable
 from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.scenario.tables import Entry, check_table, read_toml
 from expdesign.web import answers
-from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.forms import Form
-from expdesign.web.site import Site, Watched, framed, spelled, told, wrong
+from expdesign.web.site import Site, Watched, dropped, framed, spelled, told, wrong
 
 DEGREES = 7  # decimals of positions that are written, about a centimetre
 LEGEND = (
@@ -105,9 +104,7 @@ class _Sea:
             ui.label("None yet. Draw one on the chart.").classes("quiet")
         ui.label("Another chart").classes("head2")
         ui.label("GeoJSON in longitude and latitude, or an S-57 cell (*.000).").classes("quiet")
-        ui.upload(
-            label="Open a chart", auto_upload=True, max_file_size=MOST_UPLOAD_BYTES, on_upload=self._open
-        ).classes("upload")
+        dropped("Open a chart", self._open, beside=self.site.folder.path(self.area).parent)
         with ui.expansion("Start, goal and plan as numbers").classes("table"):
             Form(self.site.folder, self.scenario, ScenarioFile, changed=self._fill_later).draw(
                 "start", "goal", "plan", "environment"
