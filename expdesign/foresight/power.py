@@ -18,7 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain
+from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain, pseudo_inverse_of, solution_of
 from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, shows_for_certain, simulates_better
 from expdesign.foresight.information import SimulatedUnits, beside_nuisance
 from expdesign.values import Array
@@ -158,8 +158,8 @@ def share_shown(
         truth = np.concatenate([spread @ rng.standard_normal(c), mixture])
         score = A @ truth + np.einsum("kij,kj->ki", root, rng.standard_normal((count, len(kept))))
         total = score.sum(axis=0)
-        left = total[c:] - every[c:, :c] @ np.linalg.lstsq((every + prior)[:c, :c], total[:c], rcond=None)[0]
-        statistic = float(left @ np.linalg.lstsq(whole, left, rcond=None)[0])
+        left = total[c:] - every[c:, :c] @ solution_of((every + prior)[:c, :c], total[:c])
+        statistic = float(left @ solution_of(whole, left))
         blocks = np.einsum("kij,kbj->kbi", of_blocks, rng.standard_normal((count, units.blocks, len(kept))))
         drawn.append((statistic, (truth, score, blocks, number % len(units.squared_error))))
     drawn.sort(key=lambda item: -item[0])
@@ -199,7 +199,7 @@ def _errors_of_folds(trials: _Trials, free: slice, prior: Array, A: Array) -> Ar
     for fold in range(min(FOLDS, count)):
         test = np.arange(count) % FOLDS == fold
         own = (A[~test].sum(axis=0) + prior)[free, free]
-        found = np.linalg.lstsq(own, trials.score[:, ~test, free].sum(axis=1).T, rcond=None)[0]
+        found = pseudo_inverse_of(own) @ trials.score[:, ~test, free].sum(axis=1).T
         off[:, test, free] -= found.T[:, None]
     return off
 

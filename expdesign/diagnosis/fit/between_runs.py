@@ -17,6 +17,7 @@ import scipy
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.linear_model import window_information
+from expdesign.diagnosis.fit.own_units import pseudo_inverse_of
 from expdesign.estimation.solve import MOST_FREEDOM, Dispersion, Spread, few_runs_factor, spread_between_runs
 from expdesign.values import Array
 
@@ -76,7 +77,7 @@ def counting_stretches(found: Fit) -> Fit:
 def _spread_of_estimates(found: Fit, run: Array) -> tuple[Spread, Array]:
     """Of every estimated effect, and its covariance under noise alone."""
     A, s = (sum_by_run(item, run) for item in window_information(found.grams, found.sensitivities, found.noise))
-    covariance = np.linalg.pinv(A.sum(axis=0) + found.precision, rcond=1e-14, hermitian=True)
+    covariance = pseudo_inverse_of(A.sum(axis=0) + found.precision)
     moved = A @ covariance  # (g, c, c) each column of the covariance is the direction of an estimate
     information = np.einsum("ck,gck->gk", covariance, moved)
     taken = np.einsum("gck,cd,gdk->gk", moved, covariance, moved)
@@ -93,7 +94,7 @@ def directions_between_runs(A: tuple[Array, Array, Array], s: tuple[Array, Array
         precision: (c, c) of the effects' priors.
     """
     own, both, each = A
-    inverse = np.linalg.pinv(own.sum(axis=0) + precision, rcond=1e-14, hermitian=True)
+    inverse = pseudo_inverse_of(own.sum(axis=0) + precision)
     B = inverse @ both.sum(axis=0)  # (c, m) what of each direction the effects imitate
     known = both - own @ B
     information = each - np.einsum("cm,gcm->gm", B, both + known)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dposv
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, channel_std, linear_basis, white_noise
@@ -20,6 +19,7 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
+from expdesign.diagnosis.fit.own_units import solution_of
 from expdesign.diagnosis.model import FOLLOWING, LEAST_EFFECT, ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.values import Array
@@ -34,7 +34,6 @@ FORCE_SPACING_S = 60.0  # between the knots of a force that nobody measured [s]
 # sizes of such a force that are tried, as ridge penalties
 FORCE_PENALTIES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
 POSITIVE = tuple(f"{kind}:" for kind in FOLLOWING)  # effects that are times, from zero on
-LEAST_PIVOT = 1e-6  # of a matrix with a unit diagonal that counts as regular: the size of a direction beside all others
 LITTLE = 1e-6  # share of a step from which slopes of factors are taken
 
 
@@ -197,22 +196,12 @@ def best_step(A: Array, score: Array, bounds: Array) -> tuple[Array, float]:
         free = ~held
         step[held] = np.clip(step, *bounds)[held]
         left = score[free] - A[np.ix_(free, held)] @ step[held]
-        step[free] = _solved(A[np.ix_(free, free)], left)
+        step[free] = solution_of(A[np.ix_(free, free)], left)
         outside = free & ((step < bounds[0]) | (step > bounds[1]))
         if not outside.any():
             break
         held |= outside
     return step, float(2.0 * score @ step - step @ A @ step)
-
-
-def _solved(A: Array, b: Array) -> Array:
-    """x of A x = b by Cholesky's method, in units in which A has a unit diagonal; the shortest one of a singular A."""
-    if len(b) and (np.diag(A) > 0).all():
-        size = np.sqrt(np.diag(A))
-        root, x, failed = dposv(A / np.outer(size, size), b / size)
-        if not failed and np.diag(root).min() > LEAST_PIVOT:
-            return np.asarray(x / size)
-    return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
 
 
 def after_step(ship: ExtendedModel, keys: Sequence[str], step: Array) -> dict[str, float]:

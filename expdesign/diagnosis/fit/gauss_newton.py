@@ -30,6 +30,7 @@ from expdesign.diagnosis.fit.linear_model import (
     sensitivities_beside,
     sensitivities_to,
 )
+from expdesign.diagnosis.fit.own_units import covariance_of
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (
     LinearisedMotion,
@@ -244,7 +245,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
         ship=point.ship,
         keys=problem.keys,
         free_count=problem.free_count,
-        covariance=_inverse(A),
+        covariance=covariance_of(A),
         starts=point.starts,
         noise=noise,
         cost=cost,
@@ -316,10 +317,6 @@ def _cost_with_weights_of(problem: _Problem, best: Fit, ship: ExtendedModel, err
     quadratic = information(replace(best.sensitivities, error=error), best.noise).quadratic
     now = deviations_of(ship, problem.keys)
     return quadratic + float(now @ problem.precision @ now)
-
-
-def _inverse(A: Array) -> Array:
-    return np.asarray(np.linalg.pinv(A, rcond=1e-14, hermitian=True), dtype=float) if len(A) else np.zeros((0, 0))
 
 
 def _resized(starts: Array, n: int) -> Array:

@@ -21,6 +21,7 @@ from expdesign.diagnosis.fit import (
     build_sensitivities,
     continuing,
     counting_runs,
+    covariance_of,
     deviations_of,
     directions_between_runs,
     effect_disturbances,
@@ -33,6 +34,7 @@ from expdesign.diagnosis.fit import (
     of_several,
     on_common_units,
     runs_of,
+    solution_of,
     tail,
     window_information,
 )
@@ -140,7 +142,7 @@ def _between_units(given: UnitInformation, chosen: Sequence[int]) -> Dispersion:
     precision[:n, :n] = given.precision
     score = s.sum(axis=0)[:c]
     score[:n] -= given.precision @ given.offset
-    step = np.linalg.lstsq(A.sum(axis=0)[:c, :c] + precision, score, rcond=None)[0]
+    step = solution_of(A.sum(axis=0)[:c, :c] + precision, score)
     left = s - A[:, :, :c] @ step
     parts = A[:, :c, :c], A[:, :c, c:], np.diagonal(A, axis1=1, axis2=2)[:, c:]
     return Dispersion.of(directions_between_runs(parts, (left[:, :c], left[:, c:]), precision))
@@ -208,8 +210,7 @@ def _sizes(given: UnitInformation, chosen: list[int]) -> list[tuple[float, float
     """Values and standard errors of a sum of regressors."""
     A, s = given.beside_nuisance(np.ones(len(given.A), dtype=bool))
     block = A[np.ix_(chosen, chosen)]
-    values = np.linalg.lstsq(block, s[chosen], rcond=None)[0] if chosen else np.zeros(0)
-    std = np.sqrt(np.diag(np.linalg.pinv(block, hermitian=True))) if chosen else np.zeros(0)
+    values, std = solution_of(block, s[chosen]), np.sqrt(np.diag(covariance_of(block)))
     return list(zip(values.tolist(), std.tolist(), strict=True))
 
 

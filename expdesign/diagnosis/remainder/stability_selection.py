@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.diagnosis.fit import pseudo_inverse_of, solution_of
 from expdesign.diagnosis.model import is_thrust
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Term, VesselModel
@@ -52,7 +53,7 @@ class UnitInformation:
         if not n:
             return A, s
         own = A[:n, :n] + self.precision
-        solved = np.linalg.lstsq(own, np.column_stack([A[:n, n:], s[:n] - self.precision @ self.offset]), rcond=None)[0]
+        solved = pseudo_inverse_of(own) @ np.column_stack([A[:n, n:], s[:n] - self.precision @ self.offset])
         left, scores = A[n:, n:] - A[n:, :n] @ solved[:, :-1], s[n:] - A[n:, :n] @ solved[:, -1]
         imitated = np.diag(left) <= ROUNDING * np.diag(A)[n:]
         left[imitated], left[:, imitated], scores[imitated] = 0.0, 0.0, 0.0
@@ -126,7 +127,7 @@ def _held_out(given: UnitInformation, chosen: list[int]) -> Array:
     prior = np.concatenate([given.precision @ given.offset, np.zeros(len(chosen))])
     for fold in range(min(FOLDS, units)):
         test = np.arange(units) % FOLDS == fold
-        step = np.linalg.lstsq(A[~test].sum(axis=0) + own, s[~test].sum(axis=0) - prior, rcond=None)[0]
+        step = solution_of(A[~test].sum(axis=0) + own, s[~test].sum(axis=0) - prior)
         gains[test] = 2.0 * s[test] @ step - np.einsum("i,wij,j->w", step, A[test], step)
     return gains
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.fit import Fit, continuing, fit, marginalised, profile_cost
+from expdesign.diagnosis.fit import Fit, continuing, covariance_of, fit, marginalised, profile_cost
 from expdesign.diagnosis.select.selection import Selection
 from expdesign.estimation.solve import Dispersion, few_runs_factor
 from expdesign.values import Array
@@ -114,10 +114,8 @@ class _Profile:
         """Whether the cost rises two standard errors away, or at a bound before, about as the curvature says."""
         found, place = self._found, self._found.keys.index(self._key)
         information = marginalised(found.grams, found.sensitivities, found.noise).A + found.precision
-        std = float(np.sqrt(max(np.linalg.pinv(information, rcond=1e-14, hermitian=True)[place, place], 0.0)))
+        std = float(np.sqrt(covariance_of(information)[place, place]))
         value, (low, high) = found.value(self._key), found.ship.bounds(self._key)
-        if not std > 0.0:
-            return False
         ends = [end for end in (max(value - 2.0 * std, low), min(value + 2.0 * std, high)) if abs(end - value) > std]
         rises = [(self._at(end)[0] - self.least) / ((end - value) / std) ** 2 for end in ends]
         return bool(ends) and all(1.0 / ALIKE < rise < ALIKE for rise in rises)

@@ -34,6 +34,7 @@ from expdesign.diagnosis.fit import (
     gram_matrices,
     in_groups,
     of_several,
+    pseudo_inverse_of,
     runs_of,
     tail,
     window_information,
@@ -241,7 +242,7 @@ def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
     now = deviations_of(base.ship, base.keys)
     if c:
         of_effects = np.column_stack([A[:c, c:], score[:c] - base.precision @ now])
-        solved = np.linalg.lstsq(A[:c, :c] + base.precision, of_effects, rcond=None)[0]
+        solved = pseudo_inverse_of(A[:c, :c] + base.precision) @ of_effects
         score = score[c:] - A[c:, :c] @ solved[:, -1]
         A = A[c:, c:] - A[c:, :c] @ solved[:, :-1]
     return _Scores(A=A, s=score, size=size, index=tuple(places), spread=spread)

@@ -21,6 +21,7 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
     of_several,
     runs_of,
+    solution_of,
     tail,
 )
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
@@ -245,7 +246,7 @@ def wald_p_value(chosen: FittedCandidate, last: Fit) -> float:
     sized = [key for key in chosen.keys if key in last.keys and (key not in SHAPE or key in stated)]
     index = [last.keys.index(key) for key in sized]
     values = np.array([last.value(key) - stated.get(key, 0.0) for key in sized])
-    statistic = float(values @ np.linalg.lstsq(last.covariance[np.ix_(index, index)], values, rcond=None)[0])
+    statistic = float(values @ solution_of(last.covariance[np.ix_(index, index)], values))
     statistic *= float(few_runs_factor(last.freedom)) ** 2  # in the covariance, for intervals
     freedom = len(sized)
     if chosen.profiled is not None and chosen.profiled[0] in chosen.candidate.free:
