@@ -32,11 +32,21 @@ def test_the_tolerance_moves_the_run_by_a_share_of_that_of_its_place_within_its_
     water = leg_water(OPEN)
     decay_s = speed_decay_s(water.vessel, water.ship.transit_speed_mps)
     for spare_m in (0.0, 10.0, 40.0, 1000.0):
-        found, transit = tolerances(water, spare_m), water.ship.transit_speed_mps
+        transit = water.ship.transit_speed_mps
+        found = tolerances(water, spare_m, transit)
         assert 0.1 * transit <= found.speed_mps * (1 + 1e-9)
         assert found.speed_mps <= 0.3 * transit * (1 + 1e-9)
         if 0.11 * transit < found.speed_mps < 0.29 * transit:
             assert found.speed_mps * decay_s == pytest.approx(found.position_m / 2)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.5, 1.0])
+def test_a_slow_run_does_not_begin_at_another_speed_altogether(share):
+    """Within 30 % of its own speed, or a tenth of the speed on legs where that is more."""
+    water = leg_water(OPEN)
+    transit = water.ship.transit_speed_mps
+    found = tolerances(water, 1e6, share * transit)
+    assert found.speed_mps == pytest.approx(max(0.1, 0.3 * share) * transit)
 
 
 def test_a_ship_that_keeps_its_way_for_minutes_begins_within_a_tenth_of_its_speed():
@@ -44,7 +54,7 @@ def test_a_ship_that_keeps_its_way_for_minutes_begins_within_a_tenth_of_its_spee
     ship = capability(case.vessel, PlanSettings(clearance_m=20.0))
     water = replace(leg_water(OPEN), vessel=case.vessel, ship=ship)
     assert speed_decay_s(case.vessel, ship.transit_speed_mps) > 100.0
-    assert tolerances(water).speed_mps == pytest.approx(0.1 * ship.transit_speed_mps)
+    assert tolerances(water, 0.0, ship.transit_speed_mps).speed_mps == pytest.approx(0.1 * ship.transit_speed_mps)
 
 
 def test_starts_are_as_many_times_less_exact_as_the_plan_allows():

@@ -38,8 +38,8 @@ POSITION_HULLS = 0.2  # least tolerance of a run's start position, in hull lengt
 POSITION_ROOM, POSITION_MOST_HULLS = 0.5, 3.0
 GOAL_HULLS = 1.5  # distance from the goal at which a trial has reached it, in hull lengths
 SPEED_SHARE, YAW_RATE_SHARE = 0.1, 0.1  # tolerances of its velocity in transit speeds, of its yaw rate in the largest
-# share of the position's tolerance by which another speed at the start may move the run instead, and its limit in
-# transit speeds
+# share of the position's tolerance by which another speed at the start may move the run instead, and its limit as a
+# share of the speed through water that the run begins with
 SPEED_MOVES, SPEED_MOST_SHARE = 0.5, 0.3
 RUN_UP_SHARES = (
     1.0,
@@ -80,14 +80,14 @@ class Tolerances:
         )
 
 
-def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
-    """Of a run, by the vessel's length and its speeds on legs, and by the room beyond the clearance.
+def tolerances(water: LegWater, spare_m: float = 0.0, begins_mps: float = 0.0) -> Tolerances:
+    """Of a run, by the vessel's length and its speeds on legs, by the room beyond the clearance, and its first speed.
 
     Information does not depend on where a run begins, and the next leg begins where the run ends. So where there is
     room, the position may use a share of it, at most some hull lengths. A speed that differs at the start soon decays
     to that of the run, and its information is nearly all told after that: so the speed may differ by what moves the
-    run by a share of the position's tolerance. Heading, speed, yaw rate and the most room for the position are as many
-    times wider as the plan's settings ask.
+    run by a share of the position's tolerance, and by a share of itself. Heading, speed, yaw rate and the most room for
+    the position are as many times wider as the plan's settings ask.
     """
     ship, length_m, wider = water.ship, water.vessel.length_m, water.start_tolerance
     position_m = float(
@@ -98,11 +98,11 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
         )
     )
     moved_mps = SPEED_MOVES * position_m / speed_decay_s(water.vessel, ship.transit_speed_mps)
-    least, most = wider * SPEED_SHARE, max(SPEED_MOST_SHARE, wider * SPEED_SHARE)
+    least_mps = wider * SPEED_SHARE * ship.transit_speed_mps
     return Tolerances(
         position_m=position_m,
         heading_rad=wider * HEADING_RAD,
-        speed_mps=float(np.clip(moved_mps, least * ship.transit_speed_mps, most * ship.transit_speed_mps)),
+        speed_mps=float(np.clip(moved_mps, least_mps, max(SPEED_MOST_SHARE * begins_mps, least_mps))),
         yaw_rate_radps=wider * YAW_RATE_SHARE * ship.turn_rate_radps,
     )
 

@@ -19,7 +19,7 @@ import scipy
 import shapely
 
 from expdesign.plan.control import Helmsman
-from expdesign.plan.legs import LegWater, nearest_turns
+from expdesign.plan.legs import LegWater, nearest_turns, through_water
 from expdesign.plan.monte_carlo.guidance import GO_AROUNDS, Guidance
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, goal_within_m, tolerances
 from expdesign.plan.runs import Fleet, draw_truths
@@ -267,14 +267,19 @@ def _sail_part(
 
 
 def start_tolerances(water: LegWater, sailed: SailedTrial) -> tuple[Tolerances, ...]:
-    """Start tolerances of each leg; for runs by the room of the hull over all of the planned run.
+    """Start tolerances of each leg; for runs by the room of the hull over all of the planned run, and its first speed.
 
     What is stated of the last leg is within what distance the goal is reached.
     """
     clearance = hull_clearance(water.area, sailed.trajectory, water.vessel.hull_b)
     spare = [float(clearance[leg.first : leg.last + 1].min()) - water.clearance_m for leg in sailed.legs]
-    runs = [leg.kind == "primitive" for leg in sailed.legs]
-    within = [tolerances(water, room if run else 0.0) for room, run in zip(spare, runs, strict=True)]
+    states = np.hstack([sailed.trajectory.pose, sailed.trajectory.velocity])
+    within = [
+        tolerances(water, room, float(np.hypot(*through_water(water.environment, states[leg.first])[:2])))
+        if leg.kind == "primitive"
+        else tolerances(water)
+        for leg, room in zip(sailed.legs, spare, strict=True)
+    ]
     return (*within[:-1], replace(within[-1], position_m=goal_within_m(water)))
 
 
