@@ -223,10 +223,9 @@ def slopes(model: VesselModel, parameters: Array, table: Table, *, turning: bool
         table: signals through water.
         turning: as of `simulation.motion_rates`.
     """
-    columns = []
-    for direction in np.eye(2):
-        ahead, back = (_accelerations(model, parameters, through_water(table, sign * direction)) for sign in STEPS)
-        columns.append((ahead - back) / (2 * STEP_MPS))
+    c, s = np.cos(table["psi"])[:, None], np.sin(table["psi"])[:, None]
+    by_u, by_v = (_slope(model, parameters, table, name) for name in ("u", "v"))
+    columns = [s * by_v - c * by_u, -s * by_u - c * by_v]
     if turning:
         columns = [own + turned_with(model, table, to) for own, to in zip(columns, np.eye(2), strict=True)]
     return np.array(columns)
@@ -240,14 +239,14 @@ def turned_with(model: VesselModel, table: Table, to_mps: Array) -> Array:
     return np.asarray(every[:, [OUTPUTS.index(name) for name in model.outputs]])
 
 
-STEPS = (STEP_MPS, -STEP_MPS)
-
-
-def _accelerations(model: VesselModel, parameters: Array, table: Table) -> Array:
-    """(k, n) accelerations by all terms."""
+def _slope(model: VesselModel, parameters: Array, table: Table, name: str) -> Array:
+    """(k, n) derivative of the accelerations by a velocity through water."""
     total = np.zeros((len(table["psi"]), len(model.outputs)))
+    moved = [{**table, name: table[name] + step} for step in (STEP_MPS, -STEP_MPS)]
     for term, expression, value in zip(model.terms, model.expressions, parameters, strict=True):
-        total[:, model.outputs.index(term.equation)] += value * np.asarray(expression.evaluate(table, NUMPY))
+        if name in expression.signals:
+            ahead, back = (np.asarray(expression.evaluate(at, NUMPY)) for at in moved)
+            total[:, model.outputs.index(term.equation)] += value * (ahead - back) / (2 * STEP_MPS)
     return total
 
 

@@ -59,6 +59,8 @@ SEARCHES = 5  # for the sample that tells most, each with a better measure
 
 Indices = NDArray[np.intp]
 
+HALF = np.triu_indices(4)  # pairs of (1, force): products are symmetric
+
 
 @sealed(points="c d")
 class Richest:
@@ -78,8 +80,7 @@ def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = BOX
         most_boxes: work limit; the bound holds with any.
     """
     G = multiplier * motions.equations
-    monomials = _monomials(motions.forces)
-    boxes = _bounded(motions, G, monomials, *_first_boxes(motions))
+    boxes = _bounded(motions, G, *_first_boxes(motions))
     found, left = _samples(boxes), most_boxes * 16 / max(16, 2 ** len(motions.low))  # the work goes with the corners
     while left > 0:
         order = np.flatnonzero(boxes.bounds > found.best * (1 + BOX_GAP))
@@ -87,7 +88,7 @@ def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = BOX
             break
         order = order[np.argsort(-boxes.bounds[order])[:BOXES_AT_ONCE]]
         left -= 2 * len(order)
-        new = _bounded(motions, G, monomials, *_halved(boxes, order, motions.high - motions.low))
+        new = _bounded(motions, G, *_halved(boxes, order, motions.high - motions.low))
         new = replace(new, bounds=np.minimum(new.bounds, np.tile(boxes.bounds[order], 2)))
         found, boxes = found.with_more(_samples(new)), boxes.without(order).with_more(new)
     bound = max(found.best, float(boxes.bounds.max(initial=0.0))) * (1 + ROUNDING)
@@ -96,18 +97,19 @@ def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = BOX
 
 def sample_values(motions: Motions, multiplier: Array, rows: Array) -> Array:
     """(b, f) <G, B> at points with rows (4, b, k), for every corner of the forces."""
-    return _quadratic(rows, multiplier * motions.equations) @ _monomials(motions.forces)
+    products = _products(rows.swapaxes(0, 1), multiplier * motions.equations)
+    return products[:, *HALF] @ _monomials(motions.forces)
 
 
 def _monomials(forces: Array) -> Array:
-    """(16, f) products of (1, force) with itself."""
-    t = np.concatenate([np.ones((len(forces), 1)), forces], axis=1)
-    return np.asarray((t[:, :, None] * t[:, None, :]).reshape(len(forces), 16).T)
+    """(10, f) products of (1, force) with itself, those of two different ones twice."""
+    t = np.concatenate([np.ones((len(forces), 1)), forces], axis=1).T
+    return np.asarray(t[HALF[0]] * t[HALF[1]] * np.where(HALF[0] == HALF[1], 1.0, 2.0)[:, None])
 
 
-def _quadratic(rows: Array, G: Array) -> Array:
-    """(b, 16) rows (4, b, k) by G by rows."""
-    return np.asarray(np.einsum("ibk,jbk->bij", rows @ G, rows).reshape(-1, 16))
+def _products(rows: Array, G: Array) -> Array:
+    """(b, n, n) rows (b, n, k) by G by rows."""
+    return np.asarray((rows @ G) @ rows.swapaxes(1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,19 +152,24 @@ def _samples(boxes: _Boxes) -> _Samples:
     return _Samples(boxes.points[order], boxes.values[order])
 
 
-def _bounded(motions: Motions, G: Array, monomials: Array, centres: Array, halves: Array) -> _Boxes:
+def _bounded(motions: Motions, G: Array, centres: Array, halves: Array) -> _Boxes:
     """Boxes with upper bounds; the sample of each is at the corner where its bound is reached."""
-    middle, slopes, error = motions.affine_rows(centres, halves)
+    rows, error = motions.affine_rows(centres, halves)
     most = np.r_[1.0, np.abs(motions.forces).max(axis=0)]
     e = np.tensordot(most, error, axes=1)
     rest = np.einsum("bk,bk->b", e @ np.abs(G), e)
-    top, points = np.full(len(centres), -np.inf), centres.copy()
-    for signs in itertools.product((-1.0, 1.0), repeat=len(slopes)):
-        corner = middle + np.tensordot(np.array(signs), slopes, axes=1)
-        values = (_quadratic(corner, G) @ monomials).max(axis=1)
-        points = np.where((values > top)[:, None], centres + np.array(signs) * halves, points)
+    # a corner's rows are those of (1, signs): its products follow from theirs
+    b, d = centres.shape
+    products = _products(rows.reshape(b, 4 * (d + 1), -1), G)
+    products = products.reshape(b, 4, d + 1, 4, d + 1)[:, HALF[0], :, HALF[1]].reshape(10 * b, (d + 1) ** 2)
+    monomials, top, best = _monomials(motions.forces), np.full(b, -np.inf), np.zeros((b, d))
+    for signs in itertools.product((-1.0, 1.0), repeat=d):
+        both = np.outer(np.r_[1.0, signs], np.r_[1.0, signs]).ravel()
+        values = ((products @ both).reshape(10, b).T @ monomials).max(axis=1)
+        best[values > top] = signs
         top = np.maximum(top, values)
-    values = (_quadratic(motions.rows(points), G) @ monomials).max(axis=1)
+    points = centres + best * halves
+    values = sample_values(motions, G, motions.rows(points)).max(axis=1)
     bounds = (np.sqrt(np.maximum(top, 0.0)) + np.sqrt(rest)) ** 2
     return _Boxes(centres, halves, bounds, points, values)
 

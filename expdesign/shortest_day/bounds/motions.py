@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from expdesign.errors import InputError
 from expdesign.simulation import to_body
@@ -166,21 +168,20 @@ class Motions:
         rows[0, :, len(self.parameters) :] = 1.0
         return rows
 
-    def affine_rows(self, centres: Array, halves: Array) -> tuple[Array, Array, Array]:
-        """The same over boxes: centres (4, b, p + n), slopes (d, 4, b, p + n) and errors (4, b, p + n)."""
+    def affine_rows(self, centres: Array, halves: Array) -> tuple[Array, Array]:
+        """Over boxes: at the centre and by half of each side (b, 4, 1 + d, p + n), and errors (4, b, p + n)."""
         base, gains = self.regressors(over_boxes(centres, halves), AFFINE)
-        count, d = centres.shape
-        shape = (4, count, len(self.parameters) + len(self.model.outputs))
-        middle, slopes, error = np.zeros(shape), np.zeros((d, *shape)), np.zeros(shape)
+        (b, d), columns = centres.shape, len(self.parameters) + len(self.model.outputs)
+        rows, error = np.zeros((b, 4, 1 + d, columns)), np.zeros((4, b, columns))
         for column, values in enumerate(zip(base, *gains, strict=True)):
             for row, value in enumerate(values):
                 if isinstance(value, Affine):
-                    middle[row, :, column], error[row, :, column] = value.centre, value.error
-                    slopes[:, row, :, column] = value.slopes
+                    rows[:, row, 0, column], error[row, :, column] = value.centre, value.error
+                    rows[:, row, 1:, column] = value.slopes.T
                 else:
-                    middle[row, :, column] = value
-        middle[0, :, len(self.parameters) :] = 1.0
-        return middle, slopes, error
+                    rows[:, row, 0, column] = value
+        rows[:, 0, 0, len(self.parameters) :] = 1.0
+        return rows, error
 
     def regressors(self, point: tuple[Any, ...], ops: Operators) -> tuple[list[Any], list[list[Any]]]:
         """p regressors without force, and what each unit of force adds to them."""
@@ -260,4 +261,11 @@ def _force_corners(actuators: Sequence[Actuator]) -> Array:
         share = own @ unit_forces[:, column : column + own.shape[1]].T
         column += own.shape[1]
         corners = np.unique((corners[:, None] + share).reshape(-1, 3), axis=0)
-    return corners
+    return corners[_outermost(corners)]
+
+
+def _outermost(points: Array) -> NDArray[np.intp]:
+    """Places of the points (n, 3) whose convex hull holds all, where they span space; else of all."""
+    if np.linalg.matrix_rank(points - points.mean(axis=0)) < 3:
+        return np.arange(len(points))
+    return np.sort(ConvexHull(points).vertices)
