@@ -24,7 +24,9 @@ from expdesign.values import Array, sealed
 
 FIRST_SHARE = 0.4  # information from runs in the first day, as a share of what is needed; legs tell the rest
 COURSES = 4  # on which runs are taken to be sailed
-COURSE_SPREAD_RAD = 0.5  # of these to both sides of the straight line, before a day has been planned
+# standard deviation of these about the straight line, before a day has been planned: two courses, so far to each side,
+# average smooth functions as any even spread does, up to the third order
+COURSE_STD_RAD = 0.37
 FIRST_LEG_S = 15.0  # time of repositioning for each run, before a day has been planned [s]
 OTHER_RUNS = 1  # of each manoeuvre that it has more or fewer, at most
 AVERAGE_LEGS = 2.0  # legs to one manoeuvre that the average of all legs counts as, once days have been planned
@@ -61,8 +63,7 @@ def straight_courses(problem: PlanProblem) -> Array:
     longest_m = max(float(np.hypot(*item.displacement[:2])) for item in problem.primitives)
     if np.hypot(*away) <= longest_m:
         return np.asarray(2 * np.pi * np.arange(COURSES) / COURSES)
-    spread = np.linspace(-1.0, 1.0, COURSES)
-    return np.asarray(np.arctan2(away[1], away[0]) + COURSE_SPREAD_RAD * spread)
+    return np.asarray(np.arctan2(away[1], away[0]) + COURSE_STD_RAD * np.array([-1.0, 1.0]))
 
 
 def courses_of(track: Trajectory) -> Array:
