@@ -31,6 +31,7 @@ ROUNDS = 5  # most days that are planned in search of the shortest
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
 LEVEL_STEP, LEVEL_STEPS = 0.05, 10
+PROMISED_SHORT = 0.02  # margin by which runs may fall short on average of what the nearest days promise
 LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
@@ -219,23 +220,32 @@ class _Search:
         """The cheapest runs that reach a margin by the prices, and the day expected with them [s].
 
         Once days have been drafted, runs differ by few from one of those nearest to the accuracy, and what tells and
-        what it takes is counted from there.
+        what it takes is counted from there. The cheapest are those of which a day promises too much, so that they have
+        to reach the accuracy on average of what these days promise.
 
         Raises:
             NoAnswer: none within the limits do.
         """
-        offer, found = self.offer(prices), list[tuple[Choice, float]]()
-        for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]:
-            near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
+        offer, names, found = self.offer(prices), self.problem.design.problem.names, list[tuple[Choice, float]]()
+        around = [
+            (day, near_day(offer, prices.runs, day, names), self.accuracy.margin(day.whole) - day.margin)
+            for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]
+        ]
+        for day, near, beyond in around:
             with suppress(NoAnswer):
-                level = margin + self.accuracy.margin(day.whole) - day.margin
-                choice = cheapest_runs(self.accuracy, near, level=level)
+                choice = cheapest_runs(self.accuracy, near, level=margin + beyond)
                 saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
                 found.append((choice, day.expected_s - saved_s))
         if not found:
             choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin)
-            found.append((choice, -np.inf))  # nothing to compare with
-        return found
+            return [(choice, -np.inf)]  # nothing to compare with
+
+        def promised(choice: Choice) -> float:
+            runs = np.array(choice.repeats, dtype=float)
+            margins = [self.accuracy.margin(near.information(runs)) - beyond for _, near, beyond in around]
+            return float(np.mean(margins))
+
+        return [one for one in found if promised(one[0]) >= -PROMISED_SHORT]
 
     def cheapest(self, days: Sequence[DraftedDay]) -> Choice:
         """The cheapest runs of the whole dictionary by the prices learnt."""
