@@ -31,7 +31,7 @@ ROUNDS = 5  # most days that are planned in search of the shortest
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
 LEVEL_STEP, LEVEL_STEPS = 0.05, 10
-PROMISED_SHORT = 0.02  # margin by which runs may fall short on average of what the nearest days promise
+PROMISED = 0.1  # margin that the nearest days have to promise of runs on average; spare runs are left out afterwards
 LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
@@ -124,6 +124,15 @@ def check_way_fits(problem: PlanProblem, day_s: float) -> None:
         )
 
 
+@dataclass(frozen=True)
+class _Foreseen:
+    """Runs that another day might have."""
+
+    choice: Choice  # of them
+    expected_s: float  # the day with them, go-arounds included
+    margin: float  # that they should reach
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Search:
     """What all rounds share."""
@@ -191,7 +200,7 @@ class _Search:
         return spare[-1] if spare else None
 
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
-        """The cheapest runs not tried yet that should reach the accuracy, by some margin.
+        """The cheapest runs not tried yet that should reach the accuracy, by some margin; else those that come nearest.
 
         None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included.
 
@@ -199,29 +208,29 @@ class _Search:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
+        known, short = {other.repeats for other in tried} | {day.repeats for day in days}, list[_Foreseen]()
         for step in range(LEVEL_STEPS):
-            margin = step * LEVEL_STEP
             try:
-                found = self.choices(prices, days, tried, margin=margin)
+                found = self.choices(prices, days, margin=step * LEVEL_STEP)
             except NoAnswer:
                 if not tried:
                     raise
-                return None  # the limits allow no more than what was tried
-            known = {other.repeats for other in tried} | {day.repeats for day in days}
-            fresh = [one for one in found if one[0].repeats not in known]
-            if fresh:
-                choice, expected_s = min(fresh, key=lambda one: one[1])
-                return choice if expected_s < (1 - LEAST_SAVING) * reached_s else None
-        return None
+                break  # the limits allow no more
+            fresh = [one for one in found if one.choice.repeats not in known]
+            if enough := [one for one in fresh if one.margin >= PROMISED]:
+                best = min(enough, key=lambda one: one.expected_s)
+                return best.choice if best.expected_s < (1 - LEAST_SAVING) * reached_s else None
+            short += fresh
+        if np.isfinite(reached_s) or not short:
+            return None
+        return max(short, key=lambda one: one.margin).choice
 
-    def choices(
-        self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice], *, margin: float
-    ) -> list[tuple[Choice, float]]:
-        """The cheapest runs that reach a margin by the prices, and the day expected with them [s].
+    def choices(self, prices: Prices, days: Sequence[DraftedDay], *, margin: float) -> list[_Foreseen]:
+        """The cheapest runs that reach a margin by the prices.
 
         Once days have been drafted, runs differ by few from one of those nearest to the accuracy, and what tells and
-        what it takes is counted from there. The cheapest are those of which a day promises too much, so that they have
-        to reach the accuracy on average of what these days promise.
+        what it takes is counted from there. The cheapest are those of which a day promises too much: the margin
+        foreseen is that on average of what these days promise.
 
         Raises:
             NoAnswer: none within the limits do.
@@ -238,14 +247,14 @@ class _Search:
                 found.append((choice, day.expected_s - saved_s))
         if not found:
             choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin)
-            return [(choice, -np.inf)]  # nothing to compare with
+            return [_Foreseen(choice, -np.inf, np.inf)]  # nothing to compare with
 
         def promised(choice: Choice) -> float:
             runs = np.array(choice.repeats, dtype=float)
             margins = [self.accuracy.margin(near.information(runs)) - beyond for _, near, beyond in around]
             return float(np.mean(margins))
 
-        return [one for one in found if promised(one[0]) >= -PROMISED_SHORT]
+        return [_Foreseen(choice, expected_s, promised(choice)) for choice, expected_s in found]
 
     def cheapest(self, days: Sequence[DraftedDay]) -> Choice:
         """The cheapest runs of the whole dictionary by the prices learnt."""
