@@ -41,7 +41,7 @@ MISFIT_DEVIATIONS = 6.0  # standard deviations of the reference's misfit beyond 
 LARGEST_SIZE = 10.0  # of changes that are told from errors unlike the reference's, in sizes that matter
 # correlation times of the unmeasured force: first guess of the quick one, and the slow one [s]
 QUICK_S, SLOW_S = 300.0, 43200.0
-# variance of the slow part beside what the reference shows, as a multiple of it and by the number of times `slow_s`
+# variance of the slow part beside what the reference shows, as a multiple of it and by the number of times `SLOW_S`
 # that the reference covers
 SPARE = 8.0
 SLOW_SHARE = 1 / 16  # of the variance, in the slow part where the search begins; it never is more than the whole

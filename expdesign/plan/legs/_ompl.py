@@ -30,10 +30,10 @@ from expdesign.values import Array
 SEARCH_ITERATIONS, SEARCH_SLICES = 1500, 4
 SEARCH_BATCHES = 100  # batches of samples after which it gives up
 IMPROVING_SLICES = 1  # spent on a shorter path after the first solution
-ROADMAP_PLACES = 500  # drawn for a roadmap besides the shores' corners, in `roadmap_tries` tries at most
+ROADMAP_PLACES = 500  # drawn for a roadmap besides the shores' corners, in `ROADMAP_TRIES` tries at most
 ROADMAP_TRIES = 50_000
-# shares of a path that shortcuts span, tried one after the other, `shortcut_tries` of each at most, and no more after
-# `shortcut_misses` without a gain
+# shares of a path that shortcuts span, tried one after the other, `SHORTCUT_TRIES` of each at most, and no more after
+# `SHORTCUT_MISSES` without a gain
 SHORTCUTS = (1.0, 0.3, 0.1, 0.03)
 SHORTCUT_TRIES = 200
 SHORTCUT_MISSES = 60

@@ -40,7 +40,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 SLOW_SHARE = 0.3  # transit speeds below which a helm-steered ship is about to accelerate from rest or to stop
-# shares tried of `straight_off_hulls`, of the hull lengths to settle before a run-up, and of the stopping distance
+# shares tried of `STRAIGHT_OFF_HULLS`, of the hull lengths to settle before a run-up, and of the stopping distance
 # before a goal
 STRAIGHTS = (
     (1.0, 2.0, 1.0),
