@@ -31,7 +31,9 @@ ROUNDS = 5  # most days that are planned in search of the shortest
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
 LEVEL_STEP, LEVEL_STEPS = 0.05, 10
-PROMISED = 0.1  # margin that the nearest days have to promise of runs on average; spare runs are left out afterwards
+# margin that the nearest days have to promise of runs on average while no day reaches the accuracy; spare runs are left
+# out afterwards
+PROMISED = 0.1
 LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
@@ -208,6 +210,7 @@ class _Search:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
+        least = 0.0 if np.isfinite(reached_s) else PROMISED
         known, short = {other.repeats for other in tried} | {day.repeats for day in days}, list[_Foreseen]()
         for step in range(LEVEL_STEPS):
             try:
@@ -217,7 +220,7 @@ class _Search:
                     raise
                 break  # the limits allow no more
             fresh = [one for one in found if one.choice.repeats not in known]
-            if enough := [one for one in fresh if one.margin >= PROMISED]:
+            if enough := [one for one in fresh if one.margin >= least]:
                 best = min(enough, key=lambda one: one.expected_s)
                 return best.choice if best.expected_s < (1 - LEAST_SAVING) * reached_s else None
             short += fresh
