@@ -13,6 +13,7 @@ from expdesign.information import regressor_rows
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import Accuracy
 from expdesign.shortest_day.bounds import Motions, day, fewest_samples, richest_sample, speed_changes
+from expdesign.shortest_day.bounds import motions as motions_module
 from expdesign.shortest_day.bounds.motions import AFFINE, over_boxes
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
@@ -246,3 +247,12 @@ def test_no_motion_gains_or_loses_speed_faster_than_bounded(ship):
     place = np.searchsorted(changes.edges, speed[kept]) - 1
     assert (change[kept] <= changes.gain[place]).all()
     assert (-change[kept] <= changes.loss[place]).all()
+
+
+def test_forces_inside_the_polytope_may_be_left_out_and_flat_ones_stay():
+    rng = np.random.default_rng(5)
+    points, directions = rng.standard_normal((60, 3)), rng.standard_normal((200, 3))
+    kept = motions_module._outermost(points)
+    assert len(kept) < len(points)
+    assert (points[kept] @ directions.T).max(axis=0) == pytest.approx((points @ directions.T).max(axis=0))
+    assert motions_module._outermost(points * [1.0, 1.0, 0.0]).tolist() == list(range(60))
