@@ -175,6 +175,11 @@ def test_what_could_not_be_asked_is_told_and_the_rest_is_found(monkeypatch: pyte
     neither = told(lambda method, times: True)
     assert neither.notes == ("Whether there is a current or a dead time that nobody stated is not known: it ran away.",)
     assert neither.best.estimate is done.best.estimate
+    monkeypatch.setattr(assessing, "MOST_BY_ITSELF", 100)
+    long = told(lambda method, times: False)
+    assert long.current is None
+    (note,) = long.notes  # not in silence
+    assert "is not known: only output error tells, asked for by --method oe" in note
 
 
 @pytest.mark.thorough

@@ -12,6 +12,7 @@ from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import FileError
 from expdesign.kinematics.check import _disagreements, faster_than_stated
 from expdesign.kinematics.instruments import Finding, log_against_positions
+from expdesign.kinematics.relation import relation
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
@@ -244,6 +245,17 @@ def test_velocities_that_come_late_are_told_apart_from_a_place_by_speeds_that_di
         found = findings(tmp_path, log, ship)
         assert set(found) == {"velocity_delay_s"}
         assert found["velocity_delay_s"].value == pytest.approx(0.8, abs=0.15)  # half a sample by the sum
+
+
+@pytest.mark.parametrize("level", [0.0123, -0.00071, 1.0 / 3.0])
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_a_reading_that_never_moves_has_no_ratio_to_others(level: float, noise: float) -> None:
+    rng = np.random.default_rng(3)
+    x, z = rng.standard_normal((2, 40, 30))
+    y = level + noise * rng.standard_normal((40, 30))
+    found = relation([np.column_stack(rows) for rows in zip(y, x, np.ones_like(x), z, strict=True)])
+    assert (found is None) == (noise == 0.0)
+    assert found is None or np.isfinite([found.size, found.size_std]).all()
 
 
 @pytest.mark.parametrize("names", [NAMES, POSE])

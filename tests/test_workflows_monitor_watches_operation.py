@@ -228,6 +228,26 @@ def test_results_do_not_depend_on_the_number_of_processes(
 
 @pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
+def test_notes_on_a_part_of_a_file_say_of_which_rows(
+    voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("expdesign.workflows.commands.monitor.MOST_ROWS", 1200)
+    header, *rows = voyages["same"].read_text().splitlines()
+    order, gyro = (header.split(",").index(name) for name in ("n1_rps", "r_radps"))
+    table = np.array([row.split(",") for row in rows], dtype=object)
+    assert len(set(table[:, order])) > 1
+    table[2400:, order], table[2400:, gyro] = table[2400, order], table[2400, gyro]  # in the last piece
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([header, *map(",".join, table)]) + "\n")
+    notes = monitored(tmp_path / "out", log, "--reference", voyages["reference"])["notes"]
+    assert not any("cannot be estimated" in note for note in notes)  # orders are kept for a while, no loss
+    (dead,) = (note for note in notes if "dead sensor" in note)
+    assert dead.startswith("log.csv, rows 2402 to 3601: r_radps is ")
+    assert not any(note.startswith("log.csv: ") and "in all rows" in note for note in notes)
+
+
+@pytest.mark.thorough
+@pytest.mark.usefixtures("no_page")
 def test_a_stream_is_watched_as_its_file_is(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

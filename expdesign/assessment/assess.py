@@ -158,7 +158,8 @@ def with_unstated(
 ) -> Assessment:
     """An assessment with the current and the answers to inputs that nobody stated, as output error shows them.
 
-    Where none is among its methods, one is made for this: what nobody stated passes into the other estimates as well.
+    Where none is among its methods, one is made for this: what nobody stated passes into the other estimates as well;
+    of long data only if it is asked for, which is told.
 
     Args:
         raw: with commands as inputs.
@@ -199,7 +200,7 @@ def with_unstated(
 
 
 def _output_error_of(vessel: Vessel, options: EstimateOptions, found: Assessment) -> Trial | None:
-    """Output error of an assessment, the chosen one first; else one made in the same weather, of data not too long."""
+    """Output error of an assessment, the chosen one first; else one made in the same weather; refused for long data."""
     item = next((item for item in (found.best, *found.methods) if item.method.solver == "oe"), None)
     if item is not None:
         return Trial(method=item.method, horizon_s=item.horizon_s, found=item.estimate, start=item.start)
@@ -207,8 +208,10 @@ def _output_error_of(vessel: Vessel, options: EstimateOptions, found: Assessment
     method = method_for("oe", weather.unknown, wind=weather.wind)
     work = Work(vessel=vessel, stated=vessel, record=found.record, options=replace(options, horizon_s=horizon_s))
     record = work.seen(found.record)
-    if method is None or sum(map(len, record.batches)) > MOST_BY_ITSELF:
+    if method is None:
         return None
+    if (samples := sum(map(len, record.batches))) > MOST_BY_ITSELF:
+        raise NoAnswer(f"only output error tells, asked for by --method {method.name}, as there are {samples} samples")
     own = attempted(work, vessel, record, method, times=known_times(vessel, vessel, found.record))
     return Trial(method=method, horizon_s=horizon_s, found=_informed(own, vessel, options), start="")
 

@@ -33,6 +33,8 @@ CERTAIN = 6.0  # standard errors from what would be right at which a finding is 
 SCALE_STD = 0.001
 # least share of a regressor that the others do not explain; that of a way, which is measured better than most
 TOLD = 0.02
+# share of the squares of y that z must leave; of a sensor that never moves it leaves rounding
+LEFT = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,7 +112,7 @@ def _solved(moments: Array, told: float) -> tuple[Array, Array, float] | None:
     nuisance = np.linalg.pinv(m[2:, 2:], rcond=1e-9, hermitian=True)
     partial = m[:2, :2] - m[:2, 2:] @ nuisance @ m[2:, :2]
     own = float(np.real(partial[1, 1]))
-    if not own > told:
+    if not (own > told and np.real(partial[0, 0]) > LEFT):
         return None
     a = partial[1, 0] / partial[1, 1]
     values = np.zeros(len(scale) - 1, dtype=complex)

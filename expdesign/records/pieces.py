@@ -65,11 +65,18 @@ class Piece:
     time_s: Array  # (k,) their times [s]
     first_row: int  # row of the source that the piece begins in
     left_out: int  # rows that lack a number
+    whole: bool  # all of the source
     pending: tuple[str, ...]  # lines after the last whole stretch, which the next piece begins with
     taken: Taken  # rows of the source that were read, those of `pending` included
     # lines left over from earlier data that are still to come; until there are none, this is no state to go on from
     again: int
     skipped: int  # rows at the beginning of the source that are among those taken before
+
+    @property
+    def place(self) -> str:
+        """The source, and the rows of it that are meant, where these are not all."""
+        last = self.first_row + len(self.lines) + self.left_out - 1
+        return self.source.name if self.whole else f"{self.source.name}, rows {self.first_row} to {last}"
 
     def problem(self, error: FileError) -> FileError:
         """An error about the text as a file, told as an error of the source."""
@@ -185,10 +192,11 @@ class _Cut:
         kept = lines[:whole]
         written = self.columns.without_optional(kept) if self.columns.gaps else kept
         self.columns.gaps = False
+        first_row = max(FIRST_ROW, FIRST_ROW + rows - len(lines) - left_out)
         return Piece(
             text=self.header + "".join(written), source=self.source, header=self.header, lines=tuple(kept),
             time_s=times[:whole],
-            first_row=max(FIRST_ROW, FIRST_ROW + rows - len(lines) - left_out), left_out=left_out,
+            first_row=first_row, left_out=left_out, whole=last and first_row == FIRST_ROW,
             pending=tuple(lines[whole:]), again=again, skipped=self.skipped,
             taken=Taken(self.source.name, self.begins, rows, float(times[-1]) if len(times) else math.nan),
         )  # fmt: skip

@@ -137,7 +137,9 @@ def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch
         rows = len(piece.lines)
         reading = replace(reading.noted(f"{rows} rows are not judged: {error}"), unread_rows=reading.unread_rows + rows)
         return replace(now, reading=reading)
-    remarks = [text.replace(PIECE, piece.source.name) for text in read.record.notes]
+    # orders that stay the same for the rows of a piece are no loss: nothing is estimated from one
+    idle = () if piece.whole else read.record.idle
+    remarks = [text.replace(PIECE, piece.place) for text in read.record.notes if text not in idle]
     reading = replace(reading.noted(*remarks, *read.notes), now_s=float(piece.time_s[-1]) + reading.offset_s)
     known = known_of(now) if now.changes else read.known
     return replace(now, changes=known.changes, noise=known.noise, reading=reading)
