@@ -9,7 +9,17 @@ import pytest
 
 from expdesign.assessment import EstimateOptions, assess
 from expdesign.assessment.ahead import Ahead, by_run
-from expdesign.assessment.held_out import HeldOut, certainly_worse, folds, ranked, reason, stay_bounded
+from expdesign.assessment.held_out import (
+    Candidate,
+    Found,
+    HeldOut,
+    certainly_worse,
+    folds,
+    held_out,
+    ranked,
+    reason,
+    stay_bounded,
+)
 from expdesign.cli import main
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
@@ -182,6 +192,23 @@ def test_the_least_error_decides_and_of_equal_ones_the_least_bias(shares: dict[s
         for name, share in shares.items()
     ]
     assert found[ranked(found)[0]].method.name == best
+
+
+def test_an_estimate_that_does_not_explain_its_own_runs_goes_last_and_the_reason_says_so() -> None:
+    """From three runs of four it predicts the fourth well; from all four it came out with a tenth of the damping."""
+    ship, record = yaw_ship(), Record(batches=tuple(yaw_run(seed) for seed in range(4)))
+    true, lost = (Found(model=ship.model.with_parameters({"N_r": DECAY * share})) for share in (1.0, 0.1))
+    near = Found(model=ship.model.with_parameters({"N_r": DECAY * 1.1}))
+    candidates = [
+        Candidate(method=method_named(name), horizon_s=None, found=found, wind=False, again=lambda _, own=again: own)
+        for name, found, again in (("iv", lost, true), ("ls", near, near))
+    ]
+    found = held_out(record, candidates, ship=ship, seen_as=lambda own: own, integration=RK4)
+    assert found[0].share < found[1].share
+    assert [item.explains for item in found] == [False, True]
+    assert ranked(found) == [1, 0]
+    assert "iv with" in reason(found, "ls", ())
+    assert "its estimate from all runs predicts even these" in reason(found, "ls", ())
 
 
 def of_runs(name: str, horizon_s: float | None, errors: np.ndarray) -> HeldOut:

@@ -15,7 +15,8 @@ better for certain: by an interval of 95 % over the runs, or by a factor of `FAR
 
 Predictions of what was recorded do not show what a model does beyond it. A hull dissipates: driven no harder than in
 the data, but with its rudders hard over, no point of it gets many times as fast as in the data. A model in which one
-does goes last.
+does goes last. So does an estimate that predicts even the data it is from worse than others like it predicted what they
+had not seen: refinements may settle from parts of the data, and not from all of them.
 
 Sources: M. Stone, Journal of the Royal Statistical Society B 36 (1974), 111-147, for leaving out; L. Breiman, J. H.
 Friedman, R. A. Olshen and C. J. Stone, Classification and Regression Trees (1984), 3.4.3, for a preference among those
@@ -62,6 +63,9 @@ class HeldOut:
     shares: Array  # (n,) errors over standard deviations, geometric means over runs; nan where one never changes
     unseen: bool  # whether each run was predicted without it
     bounded: bool = True  # whether the model stays near the speeds of the data where its inputs are held
+    # whether the estimate predicts the data it is from at most `FAR_WORSE` times as badly as others like it predicted
+    # what they had not seen
+    explains: bool = True
     # (runs,) means over outputs of the logarithms of each run's errors, the same runs of all methods; or not known
     of_runs: Array | None = None
 
@@ -80,19 +84,29 @@ class HeldOut:
     @property
     def share(self) -> float:
         """Geometric mean over the outputs."""
-        return float(np.exp(np.nanmean(np.log(self.shares)))) if np.isfinite(self.shares).any() else float("inf")
+        return _joined(self.shares)
+
+    @property
+    def sound(self) -> bool:
+        """Whether what the comparison tells of the method is true of this estimate."""
+        return self.bounded and self.explains
+
+
+def _joined(shares: Array) -> float:
+    """Geometric mean over outputs with a number; inf without one."""
+    return float(np.exp(np.nanmean(np.log(shares)))) if np.isfinite(shares).any() else float("inf")
 
 
 def ranked(found: Sequence[HeldOut]) -> list[int]:
-    """Indices, the best first, models that run away last; of errors that count as equal, the least biased first.
+    """Indices, the best first, estimates that are not sound last; of errors that count as equal, the least biased one.
 
     Before these goes what makes the very error least that decides, where none is better for certain.
     """
-    best = min((item for item in found if item.bounded), key=lambda item: item.share, default=None)
+    best = min((item for item in found if item.sound), key=lambda item: item.share, default=None)
 
     def place(index: int) -> tuple[bool, int, int, float]:
         item = found[index]
-        if best is None or not item.bounded:
+        if best is None or not item.sound:
             return True, 0, 0, item.share
         if _minimises_what_decides(item) and not certainly_worse(item, best):
             return False, 0, 0, item.share
@@ -138,17 +152,22 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
     text = f"predicts {data} {AHEAD_S:g} s ahead with an error of {_bounded(own.share)}"
     if own is least:
         text += f", {others[0].label} with {_bounded(others[0].share)}" if others else ""
-    elif own is order[0] and least.bounded and _minimises_what_decides(own) and not _equal(own, least):
+    elif own is order[0] and least.sound and _minimises_what_decides(own) and not _equal(own, least):
         text += (
             f", {least.label} with {_bounded(least.share)}, which so few runs do not tell from chance; "
             f"{own.label} fits such predictions themselves"
         )
-    elif own is order[0] and least.bounded and own.method.solver != least.method.solver:
+    elif own is order[0] and least.sound and own.method.solver != least.method.solver:
         text += f", {least.label} with {_bounded(least.share)}; noise of the sensors biases {own.label} less"
     elif own is not order[0]:
         text += f"; the model of {order[0].label} cannot simulate every run"
     elif not least.bounded:
         text += f", {least.label} with {_bounded(least.share)}, but its model runs away where inputs are held"
+    elif not least.explains:
+        text += (
+            f", {least.label} with {_bounded(least.share)}, but its estimate from all runs predicts even these "
+            f"more than {FAR_WORSE:g} times as badly"
+        )
     return f"{text}; output error starts from it" if asked and own.method.name not in asked else text
 
 
@@ -240,8 +259,7 @@ def held_out(
     bounded = stay_bounded(structures, ship, seen_as(record).batches, integration)
     still: dict[bool, Ahead] = {}
 
-    def shares_of(number: int, item: Candidate) -> Array:
-        found = [row[number] for row in models]
+    def shares_of(item: Candidate, found: Sequence[Found | None]) -> Array:
         if item.method.weather.steady:
             moved = [_through_water(batch, own) for batch, own in zip(apart, found, strict=True)]
             ahead = Ahead(structures[0], moved, wind=item.wind, integration=integration, spread=apart)
@@ -251,7 +269,11 @@ def held_out(
             ahead = still[item.wind]
         return ahead.shares([None if own is None else own.model for own in found])
 
-    each = [shares_of(number, item) for number, item in enumerate(candidates)]
+    each = [shares_of(item, [row[number] for row in models]) for number, item in enumerate(candidates)]
+    own_data = [
+        shares_of(item, [item.found] * len(apart)) if unseen else found
+        for item, found in zip(candidates, each, strict=True)
+    ]
     names = [batch.name for batch in apart]
     return tuple(
         HeldOut(
@@ -261,9 +283,10 @@ def held_out(
             shares=typical(shares),
             unseen=unseen,
             bounded=own,
+            explains=_joined(typical(seen)) <= FAR_WORSE * _joined(typical(shares)),
             of_runs=by_run(shares, names),
         )
-        for candidate, shares, own in zip(candidates, each, bounded, strict=True)
+        for candidate, shares, seen, own in zip(candidates, each, own_data, bounded, strict=True)
     )
 
 

@@ -90,7 +90,7 @@ def prediction_table(found: Assessment) -> Table:
     title = f"Errors of predictions {AHEAD_S:g} s ahead of {of}, in per cent of the standard deviation"
     rows = [
         (
-            item.label if item.bounded else f"{item.label}, runs away",
+            item.label + ("" if item.sound else ", runs away" if not item.bounded else ", fails the runs it is from"),
             *(_error(share) for share in item.shares.tolist()),
             _error(item.share),
         )
