@@ -209,6 +209,7 @@ def test_an_estimate_that_does_not_explain_its_own_runs_goes_last_and_the_reason
     assert ranked(found) == [1, 0]
     assert "iv with" in reason(found, "ls", ())
     assert "its estimate from all runs predicts even these" in reason(found, "ls", ())
+    assert "its estimate from all runs predicts even these" in reason(found[:1], "iv", ())  # nothing else to take
 
 
 def of_runs(name: str, horizon_s: float | None, errors: np.ndarray) -> HeldOut:

@@ -50,6 +50,7 @@ MOST_OF_DATA = 2 / 3  # share of the data from which on a run is not left out wh
 HELD_LENGTHS = 20.0  # for which inputs are held, in ship lengths sailed: two turning circles
 MOST_HELD = 5000  # samples of that
 RUNS_AWAY = 10.0  # times as fast as in the data that no hull gets
+UNEXPLAINED = f"its estimate from all runs predicts even these more than {FAR_WORSE:g} times as badly"
 UNBIASED = ("iv", "oe", "ls")  # solvers, those first that noise biases least
 
 
@@ -98,7 +99,7 @@ def _joined(shares: Array) -> float:
 
 
 def ranked(found: Sequence[HeldOut]) -> list[int]:
-    """Indices, the best first, estimates that are not sound last; of errors that count as equal, the least biased one.
+    """Indices, the best first, estimates that are not sound last; of methods with equal errors the least biased first.
 
     Before these goes what makes the very error least that decides, where none is better for certain.
     """
@@ -164,10 +165,9 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
     elif not least.bounded:
         text += f", {least.label} with {_bounded(least.share)}, but its model runs away where inputs are held"
     elif not least.explains:
-        text += (
-            f", {least.label} with {_bounded(least.share)}, but its estimate from all runs predicts even these "
-            f"more than {FAR_WORSE:g} times as badly"
-        )
+        text += f", {least.label} with {_bounded(least.share)}, but {UNEXPLAINED}"
+    if not own.explains:
+        text += f"; but {UNEXPLAINED}"
     return f"{text}; output error starts from it" if asked and own.method.name not in asked else text
 
 

@@ -3,8 +3,8 @@
     east' cos(heading) = a north' sin(heading) + sway + stream + bias ahead'        a = scale of east / scale of north
 
 With both axes alike a is one, as what remains is the sway alone, which follows the turn, and the way ahead times a bias
-of the heading. An axis in feet, or degrees of
-longitude that were not shortened by the cosine of the latitude, make it another, on tracks that bend enough to tell.
+of the heading. An axis in feet, or degrees of longitude that were not shortened by the cosine of the latitude, make it
+another, on tracks that bend enough to tell.
 """
 
 from __future__ import annotations
