@@ -1,6 +1,7 @@
 """Every way a command can end has its exit status and its one line on stderr."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from expdesign.cli import main
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan
 from expdesign.requests import COMMANDS, Command
 
+SCENARIOS = Path(expdesign.__file__).parents[1] / "scenarios"
 ASLEEP = """
 import sys
 import time
@@ -123,15 +125,48 @@ def test_what_is_missing_is_named_with_its_meaning(command: Command, capsys: pyt
         given += [*([one.flag] if one.flag else []), "1"]
 
 
-@pytest.mark.parametrize("below", ["", "deeper/still"])
-def test_results_cannot_go_where_a_file_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], below: str, monkeypatch: pytest.MonkeyPatch
+GIVEN = {
+    "SCENARIO.toml": "mytrial/scenario.toml",
+    "VESSEL.toml": "rolls.toml",
+    "PLAN.json": "runs/plan.json",
+    "F ...": "gpx",
+    "K": "1",
+    "M ...": "1",
+    "Y ...": "1",
+}
+"""Values by what they are called in the help; of the others, a file without a single row."""
+
+
+@pytest.mark.parametrize("out", [(), ("--out", "runs/deeper/still")], ids=["usual", "asked for"])
+@pytest.mark.parametrize(
+    "command", [one for one in COMMANDS if hasattr(one.request, "out")], ids=lambda command: command.name
+)
+def test_every_command_tries_its_folder_before_it_works(
+    command: Command,
+    out: tuple[str, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    ends_with(monkeypatch, AssertionError("the work must not begin"))
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "mytrial", "-q"]) == 0
+    (tmp_path / "rolls.toml").write_text((SCENARIOS / "vessels" / "roll-model.toml").read_text("utf-8"), "utf-8")
+    (tmp_path / "empty").write_text("")
+    (tmp_path / "runs").write_text("mine")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    needed = [one for one in command.request.asked() if one.default is MISSING]
+    given = [part for one in needed for part in (one.flag, GIVEN.get(one.typed.metavar, "empty")) if part]
+    assert main([command.name, *given, *out]) == 2
+    *progress, line = capsys.readouterr().err.splitlines()
+    assert "runs is a file, expected a folder; --out names the folder of results" in line
+    assert all(re.match(r"\[ +[0-2]%\] reading ", told) for told in progress)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_new_makes_no_folder_below_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "taken").write_text("mine")
-    assert main(["run", "a.toml", "--out", str(tmp_path / "taken" / below)]) == 2
+    assert main(["new", str(tmp_path / "taken" / "mytrial"), "--card", "nowhere.toml"]) == 2
     assert "taken is a file, expected a folder" in only_line(capsys)
-    assert [path.name for path in tmp_path.rglob("*")] == ["taken"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

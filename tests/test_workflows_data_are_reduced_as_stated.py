@@ -9,7 +9,7 @@ import pytest
 
 from expdesign import workflows
 from expdesign.export.files import vessel_toml
-from expdesign.scenario import load_vessel
+from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Commands
 from expdesign.vessel import Response, Sensors, Vessel
 from expdesign.workflows.steps.present import present_state
@@ -70,7 +70,7 @@ def test_the_rest_of_a_trial_is_planned_with_an_estimate_of_the_ship(tmp_path: P
     values = commands.values * (0.7, 1.0, 0.7, 1.0)
     slow = Commands(sample_time_s=1.0, names=ship.model.inputs, values=values)
     data = write_run(tmp_path / "so-far.csv", ship, slow, pose=(-100.0, -450.0, 1.0), velocity=(1.0, 0.0, 0.0))
-    state = present_state(tmp_path / "story.toml", [data])
+    state = present_state(load_scenario(tmp_path / "story.toml"), [data])
     off = np.abs(state.ship.model.parameters / TENDER.model.parameters - 1.0)
     assert np.median(off) < 0.02
     assert any("commands of n1, a1, n2, a2 act" in note for note in state.notes)

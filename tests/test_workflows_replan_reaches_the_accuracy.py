@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from expdesign.errors import InputError
+from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, stated_accuracy
 from expdesign.workflows.commands.replan import _stated_before
 from expdesign.workflows.steps import day
@@ -21,7 +22,7 @@ from replan_case import SAMPLES, STORY, measured
 def shortest_day_so_far(folder: Path, remaining_s: float | None = None, **asked_of_day: float) -> PresentState:
     """The story's trial, asked for in the shortest day, after 200 s."""
     measured(folder / "a.csv")
-    state = present_state(STORY, [folder / "a.csv"], remaining_s=remaining_s)
+    state = present_state(load_scenario(STORY), [folder / "a.csv"], remaining_s=remaining_s)
     asked = replace(state.first.design, accuracy=AccuracySettings(as_durations=True, **asked_of_day))
     first = replace(state.first, design=asked)
     return replace(state, first=first, left_s=_left(first, state.sailed_s, remaining_s))

@@ -41,7 +41,7 @@ def refused(capsys, *arguments: object, status: int = 2) -> str:
 @pytest.mark.parametrize("degrees", [False, True])
 def test_the_rest_begins_at_the_last_row_in_metres_or_in_degrees(tmp_path, degrees):
     last = measured(tmp_path / "a.csv", degrees=degrees)
-    state = present_state(STORY, [tmp_path / "a.csv"])
+    state = present_state(load_scenario(STORY), [tmp_path / "a.csv"])
     assert np.abs(state.pose - last).max() < 1e-6
     case, _ = rest_of(state)
     assert case.start.tolist() == state.pose.tolist()
@@ -50,7 +50,7 @@ def test_the_rest_begins_at_the_last_row_in_metres_or_in_degrees(tmp_path, degre
 def test_the_last_file_gives_the_present_place(tmp_path):
     measured(tmp_path / "a.csv")
     last = measured(tmp_path / "b.csv", pose=(0.0, 0.0, 2.0))
-    state = present_state(STORY, [tmp_path / "a.csv", tmp_path / "b.csv"])
+    state = present_state(load_scenario(STORY), [tmp_path / "a.csv", tmp_path / "b.csv"])
     assert np.abs(state.pose - last).max() < 1e-6
     assert state.sailed_s == 2 * SAMPLES
 
@@ -60,7 +60,7 @@ def test_antenna_and_compass_errors_that_the_vessel_file_states_are_taken_off(tm
     text = (SCENARIOS / "vessels/tender-20m.toml").read_text(encoding="utf-8")
     found = "[sensors]\nposition_forward_m = 5.0\nposition_starboard_m = -2.0\nheading_bias_rad = 0.1"
     (tmp_path / "ship.toml").write_text(text.replace("[sensors]", found), encoding="utf-8")
-    state = present_state(STORY, [tmp_path / "a.csv"], vessel=tmp_path / "ship.toml")
+    state = present_state(load_scenario(STORY), [tmp_path / "a.csv"], vessel=tmp_path / "ship.toml")
     heading = last[2] - 0.1
     c, s = np.cos(heading), np.sin(heading)
     antenna = state.pose[:2] + np.array([5.0 * c + 2.0 * s, 5.0 * s - 2.0 * c])
@@ -76,13 +76,13 @@ def test_the_rest_begins_with_the_motion_and_the_commands_of_the_last_rows(tmp_p
     measured(tmp_path / "a.csv", noise=0.0)
     commands = wandering()
     run = simulate(SHIP, commands, pose=np.array([-100.0, -450.0, 1.0]))
-    found = present_state(STORY, [tmp_path / "a.csv"])
+    found = present_state(load_scenario(STORY), [tmp_path / "a.csv"])
     assert found.under_way is not None
     assert rest_of(found)[0].under_way is found.under_way
     assert np.array_equal(found.under_way.inputs, commands.values[-1])
     bend = np.abs(np.diff(run.velocity[-7:-1], n=2, axis=0)).max(axis=0)  # what no straight line follows
     assert (np.abs(found.under_way.velocity - run.velocity[-2]) <= 4 * bend + 1e-6).all()
-    assert present_state(STORY, [tmp_path / "a.csv"], stopped=True).under_way is None
+    assert present_state(load_scenario(STORY), [tmp_path / "a.csv"], stopped=True).under_way is None
 
 
 def test_noise_of_the_last_row_is_averaged_over_seconds():
@@ -117,10 +117,12 @@ def test_what_late_actuators_deliver_stands_as_the_rest_begins():
 @pytest.mark.thorough
 def test_what_is_left_is_the_whole_less_the_data_unless_it_is_said(tmp_path):
     measured(tmp_path / "a.csv")
-    counted = present_state(STORY, [tmp_path / "a.csv"])
+    counted = present_state(load_scenario(STORY), [tmp_path / "a.csv"])
     assert counted.left_s == load_scenario(STORY).design.total_s - SAMPLES
     assert not counted.left_stated
-    assert rest_of(present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0))[0].design.total_s == 240.0
+    assert (
+        rest_of(present_state(load_scenario(STORY), [tmp_path / "a.csv"], remaining_s=240.0))[0].design.total_s == 240.0
+    )
 
 
 def test_data_that_fill_the_whole_time_need_a_word_about_what_is_left(tmp_path, capsys):
@@ -136,7 +138,7 @@ def test_data_that_fill_the_whole_time_need_a_word_about_what_is_left(tmp_path, 
 
 def test_without_a_vessel_the_parameters_are_estimated_from_the_data(tmp_path):
     measured(tmp_path / "a.csv")
-    state = present_state(STORY, [tmp_path / "a.csv"])
+    state = present_state(load_scenario(STORY), [tmp_path / "a.csv"])
     assert state.origin.startswith("estimated from the data so far")
     error = np.abs(state.ship.model.parameters - SHIP.model.parameters)
     assert (error < 4 * state.ship.model.parameter_std + 0.02 * np.abs(SHIP.model.parameters)).all()
@@ -147,7 +149,7 @@ def test_without_a_vessel_the_parameters_are_estimated_from_the_data(tmp_path):
 def test_a_current_that_nobody_stated_is_told_where_the_rest_is_planned_with_it_in_the_values(tmp_path, current):
     """Values that had taken a current up were planned with, and no note said so; `estimate` of the same data did."""
     measured(tmp_path / "a.csv", current=current)
-    state = present_state(STORY, [tmp_path / "a.csv"])
+    state = present_state(load_scenario(STORY), [tmp_path / "a.csv"])
     assert any("current" in note for note in state.notes) == any(current)
     if not any(current):
         assert not any("times what the vessel file states" in note for note in state.notes)
@@ -163,7 +165,7 @@ def test_parameters_that_the_data_cannot_identify_keep_their_values_and_are_name
     table = np.column_stack([np.arange(SAMPLES), run.pose[:-1], velocity, values])
     header = ",".join((*NAMES, "n1_rps", "a1_rad", "n2_rps", "a2_rad"))
     np.savetxt(tmp_path / "ahead.csv", table, delimiter=",", header=header, comments="")
-    state = present_state(STORY, [tmp_path / "ahead.csv"])
+    state = present_state(load_scenario(STORY), [tmp_path / "ahead.csv"])
     assert any("cannot determine" in note and "N_mu" in note for note in state.notes)
     now = dict(zip(state.ship.model.names, state.ship.model.parameters.tolist(), strict=True))
     std = dict(zip(state.ship.model.names, state.ship.model.parameter_std.tolist(), strict=True))
@@ -215,7 +217,7 @@ def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_named(tmp_pa
     measured(tmp_path / "a.csv")
     text = (SCENARIOS / "vessels/tender-20m.toml").read_text(encoding="utf-8")
     (tmp_path / "weak.toml").write_text(text.replace("X_mu = 0.012\n", "X_mu = 0.0045\n"), encoding="utf-8")
-    case, notes = rest_of(present_state(STORY, [tmp_path / "a.csv"], vessel=tmp_path / "weak.toml"))
+    case, notes = rest_of(present_state(load_scenario(STORY), [tmp_path / "a.csv"], vessel=tmp_path / "weak.toml"))
     left = {item.name for item in load_scenario(STORY).dictionary} - {item.name for item in case.dictionary}
     assert "deceleration" in left
     assert len(notes) == len(left)
@@ -225,7 +227,7 @@ def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_named(tmp_pa
 @pytest.mark.thorough
 def test_the_rest_can_be_made_best_for_one_parameter(tmp_path):
     measured(tmp_path / "a.csv")
-    state = present_state(STORY, [tmp_path / "a.csv"], remaining_s=360.0)
+    state = present_state(load_scenario(STORY), [tmp_path / "a.csv"], remaining_s=360.0)
     variances = {}
     for interest in ((), ("N_r",), ("X_abs_u_u",)):
         case, _ = rest_of(state, interest=interest)

@@ -25,6 +25,7 @@ from expdesign.progress import Progress, silent
 from expdesign.requests import COMMANDS, Request, command_of, repeating
 from expdesign.requests.options import Argument
 
+RUNS = Path("runs")  # where results go unless another folder is asked for
 FEW_CYCLES = 20_000
 """New objects after which cycles of garbage are looked for: work with arrays leaves few, and a look takes 0.1 s."""
 
@@ -111,9 +112,25 @@ class Outcome:
         return self.document.summary
 
 
+def results_folder(request: Request, usual: Path | str) -> Path:
+    """The folder asked for, or the usual one, checked before any work is spent on something that cannot be written.
+
+    Args:
+        request: what was asked.
+        usual: folder where none is asked for; a name is one in `runs`.
+
+    Raises:
+        InputError: it is a file, lies below a file, or may not be written to.
+    """
+    folder = getattr(request, "out", None) or (usual if isinstance(usual, Path) else RUNS / usual)
+    if problem := folder_problem(folder):
+        raise InputError(f"{problem}; --out names the folder of results")
+    return folder
+
+
 def finished(
     request: Request,
-    usual: Path,
+    folder: Path,
     files: Mapping[str, Content],
     document: Document,
     progress: Progress,
@@ -121,11 +138,11 @@ def finished(
     page: str = "",
     drawing: Progress = silent,
 ) -> Outcome:
-    """Write all files into the folder asked for, or the usual one, and end.
+    """Write all files into the folder of results, and end.
 
     Args:
         request: what was asked; the document states the command that repeats it.
-        usual: folder where none is asked for.
+        folder: as `results_folder` gives it, asked for before the work.
         page: name of the document as a page, where it has one.
     """
     document = document if document.command else replace(document, command=repeating(request))
@@ -133,7 +150,7 @@ def finished(
         from expdesign.export.pages import document_html  # commands without a page do not wait for it
 
         files = {**files, page: partial(document_html, document, progress=drawing)}
-    paths = write_files(getattr(request, "out", None) or usual, files)
+    paths = write_files(folder, files)
     progress("done", 1.0)
     return Outcome(files=paths, document=document)
 
@@ -199,8 +216,6 @@ def carry_out(request: Request, *, progress: Progress = silent, tell: Told = sil
         NoAnswer: there is none.
     """
     command = command_of(request)
-    if out := getattr(request, "out", None):
-        check_out(out)
     with interruptions_wait():  # some solvers do not stand being interrupted while they load
         from expdesign import workflows
 
@@ -208,16 +223,11 @@ def carry_out(request: Request, *, progress: Progress = silent, tell: Told = sil
     return work(request, progress=progress, **({"tell": tell} if command.tells else {}))
 
 
-def check_out(out: Path) -> None:
-    """The folder for results, before hours are spent on something that cannot be written there.
-
-    Raises:
-        InputError: it is a file, lies below a file, or may not be written to.
-    """
-    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
+def folder_problem(folder: Path) -> str:
+    """Why nothing can be written into a folder, there or to be made: "" where it can."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists() or path.is_symlink())
     if there.is_symlink() and not there.exists():
-        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
+        return f"{folder}: {there} is a link to {there.readlink()}, which does not exist"
     if not there.is_dir():
-        raise InputError(f"--out {out}: {there} is a file, expected a folder")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"--out {out}: no permission to write in {there}")
+        return f"{folder}: {there} is a file, expected a folder"
+    return "" if os.access(there, os.W_OK | os.X_OK) else f"{folder}: no permission to write in {there}"

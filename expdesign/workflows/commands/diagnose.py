@@ -30,7 +30,7 @@ from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.outcome import Outcome, finished, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, shared, workflow
 from expdesign.workflows.steps.measured import doubted, equipped, measured
 
 SINCE_CHANGE = "since-change.csv"  # file that a watch leaves for a diagnosis
@@ -43,6 +43,7 @@ MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 @workflow
 def diagnose(request: requests.Diagnose, *, progress: Progress = silent) -> Outcome:
     """Causes of the simulation error and the gain from adding them, into `out` or runs/<first data file>."""
+    folder = results_folder(request, request.data[0].stem)
     progress("reading the data", 0.0)
     ship, told = equipped(request.vessel, request.data)
     ship, named = with_alarms(ship, request.data)
@@ -63,7 +64,7 @@ def diagnose(request: requests.Diagnose, *, progress: Progress = silent) -> Outc
     }
     return finished(
         request,
-        Path("runs") / request.data[0].stem,
+        folder,
         files,
         diagnosis_document(found, roll),
         progress,

@@ -36,7 +36,7 @@ from expdesign.workflows.steps.scored import (
 @workflow
 def score(request: requests.Score, *, progress: Progress = silent) -> Outcome:
     """Information of every primitive of a scenario's dictionary; `vessel` stands in for the vessel file it names."""
-    case = loaded(request.scenario, progress, vessel=request.vessel)
+    case = loaded(request, progress)
     information = scored(case, progress=within(progress, 0.05, 0.95))
     table, strayed = ranking(case, information), deviating([item.primitive for item in information])
     facts = {
@@ -166,7 +166,7 @@ def durations(request: requests.Durations, *, progress: Progress = silent) -> Ou
     With `monte_carlo` trials of each primitive alone, shares are by the fused covariance of its estimates instead.
     `vessel` stands in for the vessel file that the scenario names.
     """
-    case = loaded(request.scenario, progress, vessel=request.vessel)
+    case = loaded(request, progress)
     if request.monte_carlo:
         if request.grow or case.design.grow is not None:
             raise InputError("--monte-carlo takes the dictionary as it is, expected neither --grow nor [design.grow]")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from expdesign import requests
 from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind, with_unstated
 from expdesign.errors import InputError, NotInformative
@@ -13,7 +11,7 @@ from expdesign.export.files import estimate_json, estimated_vessel
 from expdesign.export.folder import Content
 from expdesign.progress import Progress, silent, within
 from expdesign.requests import repeating
-from expdesign.workflows.outcome import Outcome, finished, workers, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workers, workflow
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 
 
@@ -24,6 +22,7 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
     for path in data_files(request.tests):
         if path in used:
             raise InputError(f"{path} is given for estimation and for testing, expected only one of them")
+    folder = results_folder(request, request.data[0].stem)
     progress("reading the data", 0.0)
     ship, told = equipped(request.vessel, [*request.data, *request.tests])
     raw = measured(request.data, ship, velocity=request.velocity, told=told)
@@ -63,7 +62,7 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
     }
     return finished(
         request,
-        Path("runs") / request.data[0].stem,
+        folder,
         files,
         estimate_document(found, ship),
         progress,

@@ -32,7 +32,7 @@ def foresee(request: requests.Foresee, *, progress: Progress = silent) -> Outcom
         if request.plan is not None:
             raise InputError("--plan and --operation are given, expected one of them")
         return _operation(request, request.operation, progress)
-    case = loaded(request.scenario, progress)
+    case = loaded(request, progress)
     with shared(request, load=None):
         information, _ = ready(case, seed=request.seed, progress=within(progress, 0.02, 0.15))
         offers = [item.primitive for item in information]
@@ -55,7 +55,7 @@ def foresee(request: requests.Foresee, *, progress: Progress = silent) -> Outcom
 
 def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> Outcome:
     """What a watch over the scenario's ship in its weather would find."""
-    case = loaded(request.scenario, progress)
+    case = loaded(request, progress)
     with shared(request, load=None):
         found = foresee_operation(
             case.vessel, case.environment, voyages=voyages, seed=request.seed, progress=within(progress, 0.02, 0.97)

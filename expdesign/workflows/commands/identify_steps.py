@@ -19,7 +19,7 @@ from expdesign.signals import Record, fit_percent
 from expdesign.step_trials import Sailed, StepTrial, ahead_only, controls_of, nominal_vessel, sailed, with_delays
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -37,6 +37,7 @@ def identify_steps(request: requests.IdentifySteps, *, progress: Progress = sile
     for path in request.tests:
         if path in request.data:
             raise InputError(f"{path} is given to identify and to test, expected only one of them")
+    folder = results_folder(request, request.data[0].stem)
     progress("reading the data", 0.0)
     ship, told = (None, ()) if request.vessel is None else equipped(request.vessel, request.data)
     record = _record(request.data, ship, request.velocity)
@@ -63,7 +64,7 @@ def identify_steps(request: requests.IdentifySteps, *, progress: Progress = sile
     }
     if content.nominal is not None:
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
-    return finished(request, Path("runs") / request.data[0].stem, files, document, progress, page="step-trial.html")
+    return finished(request, folder, files, document, progress, page="step-trial.html")
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:

@@ -66,7 +66,7 @@ from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.values import closed
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, workflow
+from expdesign.workflows.outcome import Outcome, results_folder, workflow
 
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
 MOST_COMPARED = 200_000
@@ -92,6 +92,7 @@ def import_logs(request: requests.Import, *, progress: Progress = silent) -> Out
         InputError: arguments or files that are wrong.
         NoAnswer: the logs hold nothing that makes a record.
     """
+    folder = results_folder(request, f"{request.logs[0].stem}-runs")
     names = [path.name for path in request.logs]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"two logs are named {twice}, expected names that differ, as the mapping calls logs by them")
@@ -115,7 +116,6 @@ def import_logs(request: requests.Import, *, progress: Progress = silent) -> Out
         sample_time_s=request.sample_time_s or mapping.sample_time_s,
         length_m=request.length_m or mapping.length_m or (ship.length_m if ship is not None else 0.0),
     )
-    folder = request.out or Path("runs") / f"{request.logs[0].stem}-runs"
     notes = [f"{log.source}: {note}" for log in read for note in log.notes]
     used = {use.file for use in mapping.uses if use.column}
     notes += [

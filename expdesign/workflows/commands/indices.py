@@ -15,7 +15,7 @@ from expdesign.particulars import Expected, expected, standard_trials
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 from expdesign.workflows.steps.measured import data_files, equipped, measured
 
 
@@ -25,6 +25,7 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
 
     Depth of the water, mean true wind and sea state are those of the measured trials, for the form.
     """
+    folder = results_folder(request, f"{request.vessel.stem}-indices")
     progress("reading the vessel", 0.0)
     ship, told = equipped(request.vessel, request.data)
     _check_place(ship, request.antenna_forward_m)
@@ -45,7 +46,7 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
     )
     return finished(
         request,
-        Path("runs") / f"{request.vessel.stem}-indices",
+        folder,
         {"indices.json": indices_json(content)},
         indices_document(content),
         progress,

@@ -23,7 +23,7 @@ from expdesign.reduction import at_reference_point
 from expdesign.requests import repeating
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 from expdesign.workflows.steps.labelled import labelled_design, labelled_document, labelled_files, piece_of
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 
@@ -39,6 +39,7 @@ def mine(request: requests.Mine, *, progress: Progress = silent) -> Outcome:
         InputError: arguments or files that are wrong.
         NoAnswer: the data do not inform about every parameter, or the nominal model is unstable.
     """
+    folder = results_folder(request, request.data[0].stem)
     progress("reading the data", 0.02)
     (ship, told), paths = equipped(request.vessel, request.data), data_files(request.data)
     if request.labels is not None:
@@ -48,13 +49,13 @@ def mine(request: requests.Mine, *, progress: Progress = silent) -> Outcome:
             raise InputError("--mean is batch, expected complete or none with --labels")
         record = reduced_data(paths, ship, velocity=request.velocity, told=told)
         with doubted(record):
-            return _designed(request, request.piece_s, record, paths, ship.model, within(progress, 0.1, 1.0))
+            return _designed(request, folder, request.piece_s, record, paths, ship.model, within(progress, 0.1, 1.0))
     record = in_pieces(measured(paths, ship, velocity=request.velocity, told=told), request.piece_s)
     with doubted(record):
-        return _mined(request, record, ship, progress)
+        return _mined(request, folder, record, ship, progress)
 
 
-def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progress) -> Outcome:
+def _mined(request: requests.Mine, folder: Path, record: Record, ship: Vessel, progress: Progress) -> Outcome:
     """A choice of batches, written."""
     windy = all(batch.wind is not None for batch in record.batches)
     names, unseen = _parameters(ship.model, request.fixed, windy=windy)
@@ -75,7 +76,7 @@ def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progr
         "chosen.csv": record_csv(chosen),
     }
     document = _document(content, _table(subset, batches), notes)
-    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(request, folder, files, document, progress)
 
 
 LEFT_OUT = (
@@ -110,6 +111,7 @@ MAY_FALL = (
 
 def _designed(
     request: requests.Mine,
+    folder: Path,
     piece_s: float,
     record: Record,
     paths: Sequence[Path],
@@ -131,7 +133,7 @@ def _designed(
     )
     files = labelled_files(found, names, model.outputs, repeating(request))
     document = replace(labelled_document(found, model.outputs), notes=record.notes)
-    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(request, folder, files, document, progress)
 
 
 def in_pieces(record: Record, piece_s: float | None) -> Record:

@@ -25,7 +25,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, pieces
 from expdesign.requests import repeating
 from expdesign.saved import restored, saved
-from expdesign.workflows.outcome import Outcome, finished, left_state, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, left_state, results_folder, shared, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.watched_ship import Asked, Read, prepared, unread
 from expdesign.workflows.steps.watching import (
@@ -51,7 +51,7 @@ WRITTEN_EVERY_S = 20.0  # time between writing files, from which a watch that is
 def monitor(request: requests.Monitor, *, progress: Progress = silent) -> Outcome:
     """Watch a ship in operation, into `out` or runs/<first data file>."""
     _check(request)
-    folder = request.out or Path("runs") / (request.data[0].stem if request.data[0] != STREAM else "monitor")
+    folder = results_folder(request, request.data[0].stem if request.data[0] != STREAM else "monitor")
     data, reference = data_files(request.data), data_files(request.reference)
     ship, told = equipped(request.vessel, [source for source in (*reference, *data) if source != STREAM])
     asked = Asked(

@@ -33,7 +33,7 @@ from expdesign.scenario import NAME, NAME_RULE, load_card, load_scenario, load_v
 from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.simulation.helm import HARD_OVER_RAD, Helm
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, workflow
+from expdesign.workflows.outcome import Outcome, folder_problem, workflow
 
 TEMPLATES = files("expdesign") / "templates"
 KINDS = {
@@ -98,6 +98,8 @@ def new(request: requests.New, *, progress: Progress = silent) -> Outcome:
     """
     if request.folder.exists():
         raise InputError(f"{request.folder} exists, expected the name of a folder to be made")
+    if problem := folder_problem(request.folder):
+        raise InputError(problem)
     name, kind = request.folder.resolve().name, request.kind or USUAL
     if not NAME.fullmatch(name):
         raise InputError(f"the folder's name is the scenario's and is {name!r}, expected {NAME_RULE}")

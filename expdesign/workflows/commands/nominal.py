@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from expdesign import requests
 from expdesign.export.folder import Content
 from expdesign.export.nominal_page import nominal_document, nominal_json, nominal_toml
@@ -11,7 +9,7 @@ from expdesign.particulars import nominal as fitted
 from expdesign.progress import Progress, silent
 from expdesign.requests import repeating
 from expdesign.scenario import load_card
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 
 
 @workflow
@@ -21,6 +19,7 @@ def nominal(request: requests.Nominal, *, progress: Progress = silent) -> Outcom
     Raises:
         FileError: something in the card is wrong.
     """
+    folder = results_folder(request, f"{request.card.stem}-nominal")
     progress("reading the card", 0.0)
     found = fitted(load_card(request.card), seed=request.seed, progress=progress)
     command = repeating(request)
@@ -28,5 +27,4 @@ def nominal(request: requests.Nominal, *, progress: Progress = silent) -> Outcom
         "vessel.toml": nominal_toml(found, command),
         "nominal.json": nominal_json(found, command),
     }
-    usual = Path("runs") / f"{request.card.stem}-nominal"
-    return finished(request, usual, files, nominal_document(found), progress, page="nominal.html")
+    return finished(request, folder, files, nominal_document(found), progress, page="nominal.html")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -23,14 +22,15 @@ from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.requests import repeating
-from expdesign.scenario import Scenario
+from expdesign.scenario import Scenario, load_scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, finished, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, shared, workflow
 from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.day import compared_criteria, day_document, day_files, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
+from expdesign.workflows.steps.measured import data_files
 from expdesign.workflows.steps.planned import built_route, plan_document, report_content, trial_files
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
 from expdesign.workflows.steps.scored import growth_document, ready
@@ -47,8 +47,10 @@ def replan(request: requests.Replan, *, progress: Progress = silent) -> Outcome:
         NoAnswer: there is no informative design or no feasible plan.
     """
     progress("reading scenario and data", 0.0)
+    first = load_scenario(request.scenario, data=data_files(request.data))
+    results_folder(request, first.name)
     state = present_state(
-        request.scenario,
+        first,
         request.data,
         vessel=request.vessel,
         remaining_s=request.remaining_s,
@@ -94,7 +96,7 @@ def _replanned(state: PresentState, request: requests.Replan, progress: Progress
     }  # fmt: skip
     document = _known_document(case.name, known) + growth_document(growth, case) + day_document(day)
     document += plan_document(case, day.plan) + Document(notes=day.plan.area.notes)
-    return finished(request, Path("runs") / case.name, files, document, progress)
+    return finished(request, results_folder(request, case.name), files, document, progress)
 
 
 def _stated_before(

@@ -37,7 +37,7 @@ from expdesign.roll.runs import PASSED_GAIN
 from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import Batch
 from expdesign.vessel import RollPendulum, Vessel
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 from expdesign.workflows.steps.measured import equipped
 
 HEADER = ("mass [kg]", "shift [m]", "heel [deg]", "std of GM [m]", "std of GM [%]", "std of inertia [%]")
@@ -52,6 +52,7 @@ def incline(request: requests.Incline, *, progress: Progress = silent) -> Outcom
         NoAnswer: the ship does not stay upright.
     """
     ship = load_vessel(request.vessel)
+    folder = results_folder(request, f"{ship.name}-incline")
     pendulum = ship.pendulum
     if pendulum is None:
         raise FileError(request.vessel, "roll", "is missing, expected a table [roll] with masses and heights")
@@ -84,7 +85,7 @@ def incline(request: requests.Incline, *, progress: Progress = silent) -> Outcom
     table = [_row(pendulum, pair, one) for pair, one in zip(pairs, found, strict=True)]
     tests = Table(title="Inclining tests", header=HEADER, rows=tuple(table))
     document = Document(facts=summary, findings=told, sections=tabled(tests))
-    return finished(request, Path("runs") / f"{ship.name}-incline", files, document, progress)
+    return finished(request, folder, files, document, progress)
 
 
 def _in_waves(
@@ -127,6 +128,7 @@ def roll(request: requests.Roll, *, progress: Progress = silent) -> Outcome:
         InputError: arguments or files that are wrong.
         NoAnswer: the data tell too little.
     """
+    folder = results_folder(request, request.data[0].stem)
     progress("reading the data", 0.0)
     ship, told = (None, ()) if request.vessel is None else equipped(request.vessel, request.data)
     known = load_cases(request.loads, ship)
@@ -159,7 +161,7 @@ def roll(request: requests.Roll, *, progress: Progress = silent) -> Outcome:
     files: dict[str, Content] = {"roll.json": roll_json(content)}
     if ship is not None:
         files["vessel-roll.toml"] = _fitted(ship, content)
-    return finished(request, Path("runs") / request.data[0].stem, files, document, progress, page="roll.html")
+    return finished(request, folder, files, document, progress, page="roll.html")
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:

@@ -20,7 +20,7 @@ from expdesign.progress import Progress, ending, silent, within
 from expdesign.requests import command_text, repeating
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.workflows.outcome import Outcome, load_planner, shared, workflow
+from expdesign.workflows.outcome import Outcome, load_planner, results_folder, shared, workflow
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, check_plannable, planned, report_content, trial_files
@@ -42,7 +42,7 @@ def roll_plan(request: requests.RollPlan, *, progress: Progress = silent) -> Out
         most_s=60.0 * request.minutes,
         refusal=lambda now: _too_long(request.minutes, now, cache=not request.no_cache),
     )
-    case = loaded(request.scenario, limited)
+    case = loaded(request, limited)
     pendulum = case.vessel.pendulum
     if pendulum is None:
         raise FileError(
@@ -61,7 +61,7 @@ def roll_plan(request: requests.RollPlan, *, progress: Progress = silent) -> Out
             aim=_aim(question, request.interest), most_loads=request.most_loads,
             progress=within(limited, 0.1, 0.3 if request.place else 0.9),
         )  # fmt: skip
-        folder = request.out or Path("runs") / case.name
+        folder = results_folder(request, case.name)
         command = repeating(request)
         content = LoadContent(
             scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 from expdesign import requests
 from expdesign.durations import with_repeats
@@ -11,7 +10,7 @@ from expdesign.export.files import planned_accuracy
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_repeats
-from expdesign.workflows.outcome import Outcome, shared, workflow
+from expdesign.workflows.outcome import Outcome, results_folder, shared, workflow
 from expdesign.workflows.steps.case import drafted, loaded, written
 from expdesign.workflows.steps.day import Day, compared_criteria, day_document, day_files, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -31,7 +30,7 @@ from expdesign.workflows.steps.scored import growth_document, ready
 @workflow
 def plan(request: requests.Plan, *, progress: Progress = silent) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
-    case = loaded(request.scenario, progress, vessel=request.vessel)
+    case = loaded(request, progress)
     with drafted(request, case):
         check_plannable(case)
         with shared(request):
@@ -79,10 +78,10 @@ def run(request: requests.Run, *, progress: Progress = silent) -> Outcome:
     Raises:
         InputError: a draft would stand beside files of a trial that may be sailed.
     """
-    case = loaded(request.scenario, progress, vessel=request.vessel)
+    case = loaded(request, progress)
     if request.draft:
         case = replace(case, plan=replace(case.plan, draft=True))
-        out = request.out or Path("runs") / f"{case.name}-draft"
+        out = results_folder(request, f"{case.name}-draft")
         check_no_trial(out)
         request = request.but(out=out)
     with drafted(request, case):

@@ -18,7 +18,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, in_waves, measure
 from expdesign.simulation import simulate as simulate_run
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 
 
 @workflow
@@ -29,6 +29,7 @@ def simulate(request: requests.Simulate, *, progress: Progress = silent) -> Outc
     where the vessel's file has a current or a wind, around that. Waves of its [roll] roll it. With `until_s` the data
     end at that time, as of a trial broken off.
     """
+    folder = results_folder(request, request.plan.parent)
     progress("reading the plan", 0.05)
     track, vessel = read_plan(request.plan), load_vessel(request.truth)
     if (vessel.model.inputs, vessel.sample_time_s) != (track.commands.names, track.commands.sample_time_s):
@@ -63,7 +64,7 @@ def simulate(request: requests.Simulate, *, progress: Progress = silent) -> Outc
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
     files = {"measured.csv": _csv(columns)}
-    return finished(request, request.plan.parent, files, Document(facts=summary), progress)
+    return finished(request, folder, files, Document(facts=summary), progress)
 
 
 def _truth_weather(forecast: Environment, own: Environment) -> Environment:

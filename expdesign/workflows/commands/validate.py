@@ -18,9 +18,10 @@ from expdesign.information import estimated_parameters
 from expdesign.memory import digest
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
-from expdesign.scenario import Scenario, load_scenario, load_vessel
+from expdesign.scenario import Scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, finished, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, shared, workflow
+from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
 
@@ -35,7 +36,7 @@ def validate_design(request: requests.Validate, *, progress: Progress = silent) 
     unknown. An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all
     are done.
     """
-    case = load_scenario(request.scenario)
+    case = loaded(request, progress)
     method = _method(case, request.method)
     method_named(method)  # refused before the dictionary is scored
     ship = case.vessel if request.truth is None else load_vessel(request.truth)
@@ -62,7 +63,7 @@ def validate_design(request: requests.Validate, *, progress: Progress = silent) 
         trials=request.trials,
         seed=request.seed,
     )
-    folder = request.out or Path("runs") / case.name
+    folder = results_folder(request, case.name)
     done, keep, forget = _chunk_store(folder / f".validation-{digest(__version__, rehearsal)}")
     with shared(request, load=None):
         results = validate(rehearsal, done=done, keep=keep, progress=within(progress, 0.05, 0.95))

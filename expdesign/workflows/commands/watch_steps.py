@@ -35,7 +35,7 @@ from expdesign.saved import restored, saved
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import Row, Setup, State, StepList, after_row, beginning, expected_constants
 from expdesign.vessel import Actuator, Limit, column_name
-from expdesign.workflows.outcome import Outcome, Told, finished, left_state, silently, workflow
+from expdesign.workflows.outcome import Outcome, Told, finished, left_state, results_folder, silently, workflow
 from expdesign.workflows.steps.measured import equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -76,13 +76,13 @@ def watch_steps(request: requests.WatchSteps, *, tell: Told = silently, progress
         InputError: arguments or files that are wrong.
         NotInformative: the data hold no step of the list.
     """
+    folder = results_folder(request, "watch-steps" if request.data == STREAM else request.data.stem)
     ship, told = equipped(request.vessel, [] if request.data == STREAM else [request.data])
     controls = controls_of(ship.model.inputs, request.throttle, request.rudder)
     wanted = listed_steps(request.steps, ship.model.inputs, controls, ship)
     learnt_s = min(LEARN_S, LEARN_SHARE * wanted.first_s) if request.learn_s is None else request.learn_s
     setup = Setup(steps=wanted, constants_s=expected_constants(ship, wanted), learn_s=learnt_s, seed=request.seed)
     command = repeating(request, keep={"out"})
-    folder = request.out or Path("runs") / ("watch-steps" if request.data == STREAM else request.data.stem)
     work = _Work(setup=setup, folder=folder, command=command, actuators=ship.model.actuators)
     now = _resumed(folder / STATE, wanted) if request.resume else _Watch(state=beginning(setup))
     now = replace(now, notes=tuple(dict.fromkeys((*told, *now.notes))))

@@ -27,7 +27,7 @@ from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, finished, load_plans, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, load_plans, results_folder, shared, workflow
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed, duration_problem
 from expdesign.workflows.steps.planned import check_plannable, plan_document
@@ -52,6 +52,7 @@ def whatif(request: requests.WhatIf, *, progress: Progress = silent) -> Outcome:
     """
     progress("reading the scenario", 0.0)
     base = load_scenario(request.scenario)
+    out = results_folder(request, f"{base.name}-whatif")
     cases = [(base, ()), *(load_variant(request.scenario, variant) for variant in request.variants)]
     names = [case.name for case, _ in cases]
     paths = (request.scenario, *request.variants)
@@ -87,7 +88,7 @@ def whatif(request: requests.WhatIf, *, progress: Progress = silent) -> Outcome:
         raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
     document = whatif_document(content)
     files: dict[str, Content] = {"whatif.json": whatif_json(content)}
-    return finished(request, Path("runs") / f"{base.name}-whatif", files, document, progress, page="whatif.html")
+    return finished(request, out, files, document, progress, page="whatif.html")
 
 
 def _check(case: Scenario, path: Path, seed: int) -> None:

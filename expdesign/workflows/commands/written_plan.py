@@ -19,7 +19,7 @@ from expdesign.export.formats.check import check_route_file
 from expdesign.export.result_page import Estimated, Indices, PlanResult, ResultContent, result_document
 from expdesign.export.routes import ROUTE_NAME, build_bridge_route, build_route, read_plan
 from expdesign.progress import Progress, silent
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, results_folder, workflow
 
 
 @workflow
@@ -32,6 +32,7 @@ def export(request: requests.Export, *, progress: Progress = silent) -> Outcome:
     for known in request.formats:
         find_format(known)
     called = _name(request.name)
+    folder = results_folder(request, request.plan.parent)
     progress("reading the plan", 0.1)
     track, starts = read_plan(request.plan), _departure(request.departure)
     if request.fine or request.tolerance_m is not None:
@@ -39,7 +40,7 @@ def export(request: requests.Export, *, progress: Progress = silent) -> Outcome:
     else:
         route = build_bridge_route(track, departure=starts)
     route = replace(route, name=called)
-    files = write_files(request.out or request.plan.parent, route_files(route, tuple(dict.fromkeys(request.formats))))
+    files = write_files(folder, route_files(route, tuple(dict.fromkeys(request.formats))))
     summary = {
         "waypoints": len(route.waypoints),
         "length_m": route.length_m,
@@ -93,6 +94,7 @@ def trial_result(request: requests.TrialResult, *, progress: Progress = silent) 
     Raises:
         InputError: a file is wrong, or they are not of the same ship.
     """
+    folder = results_folder(request, request.plan.parent)
     planned = read_json(request.plan, PlanResult, "a plan.json as expdesign run writes it")
     if planned.draft:
         raise FileError(request.plan, "draft", "is true: a draft is not sailed, expected the plan that was")
@@ -116,4 +118,4 @@ def trial_result(request: requests.TrialResult, *, progress: Progress = silent) 
     files: dict[str, Content] = {
         "result.json": strict_json({"ship": planned.vessel.name, "trial": planned.scenario, **document.summary}),
     }
-    return finished(request, request.plan.parent, files, document, progress, page="result.html")
+    return finished(request, folder, files, document, progress, page="result.html")

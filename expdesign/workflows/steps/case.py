@@ -16,21 +16,30 @@ from expdesign.progress import Progress
 from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.vessel import NOT_ACTING_BACK
-from expdesign.workflows.outcome import Outcome, finished
+from expdesign.workflows.outcome import Outcome, finished, results_folder
 from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")  # names of the files of a draft; no results have them
 PLAN = "plan.json"  # name of a file that every plan has
 ScenarioRequest = (
-    requests.Run | requests.Plan | requests.Score | requests.Durations | requests.Foresee | requests.Replan
+    requests.Run
+    | requests.Plan
+    | requests.Score
+    | requests.Durations
+    | requests.Foresee
+    | requests.Replan
+    | requests.RollPlan
+    | requests.Validate
 )
 """Of commands that write results of a scenario."""
 
 
-def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) -> Scenario:
-    """A scenario file; with `vessel`, that file in place of the one it names."""
+def loaded(request: ScenarioRequest, progress: Progress) -> Scenario:
+    """The scenario that is asked for, whose results can be written; with a vessel file in place of the one it names."""
     progress("reading the scenario", 0.0)
-    return load_scenario(scenario, vessel=vessel)
+    case = load_scenario(request.scenario, vessel=getattr(request, "vessel", None))
+    results_folder(request, case.name)
+    return case
 
 
 def _noted(case: Scenario, document: Document) -> Document:
@@ -56,9 +65,9 @@ def written(
 
     A plan takes an earlier draft away.
     """
-    usual = Path("runs") / case.name
-    outcome = finished(request, usual, files, _noted(case, document), progress, page=page)
-    if left := _undeleted(request.out or usual) if PLAN in files else ():
+    folder = results_folder(request, case.name)
+    outcome = finished(request, folder, files, _noted(case, document), progress, page=page)
+    if left := _undeleted(folder) if PLAN in files else ():
         note = f"The earlier draft cannot be deleted and is of no use: {', '.join(left)}."
         return replace(outcome, document=outcome.document + Document(notes=(note,)))
     return outcome
@@ -82,7 +91,7 @@ def drafted(request: ScenarioRequest, case: Scenario) -> Iterator[None]:
     Results of an earlier attempt stay there, and the draft says that they are none of this one. Other refusals have
     nothing to show on a chart.
     """
-    folder = request.out or Path("runs") / case.name
+    folder = results_folder(request, case.name)
     try:
         yield
     except NoPlan as error:

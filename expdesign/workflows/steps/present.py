@@ -18,7 +18,7 @@ from expdesign.plan.values import UnderWay
 from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
 from expdesign.reduction import reduced
-from expdesign.scenario import Scenario, load_scenario
+from expdesign.scenario import Scenario
 from expdesign.scenario.scenario_file import berth_problem, build_berth
 from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Record
@@ -26,7 +26,7 @@ from expdesign.simulation import Environment, acting_response, delivered_at_samp
 from expdesign.values import Array, sealed
 from expdesign.vessel import Vessel
 from expdesign.workflows.steps.known import updated
-from expdesign.workflows.steps.measured import data_files, equipped, measured
+from expdesign.workflows.steps.measured import equipped, measured
 
 MOTION_S, MOTION_ROWS = 5.0, 3
 """Time before the last row whose velocities tell how the ship moves there, and the fewest that must be known."""
@@ -51,7 +51,7 @@ class PresentState:
 
 
 def present_state(
-    scenario: Path,
+    first: Scenario,
     data: Sequence[Path],
     *,
     vessel: Path | None = None,
@@ -59,14 +59,11 @@ def present_state(
     stopped: bool = False,
     progress: Progress = silent,
 ) -> PresentState:
-    """Where a trial stands; arguments as of `replan`.
+    """Where the trial of a scenario stands; other arguments as of `replan`.
 
     Raises:
         InputError: something in the files is wrong, the ship is not in safe water, or no time is left.
     """
-    if not data:
-        raise InputError("no data files are given, expected one or more CSV files after --data")
-    first = load_scenario(scenario, data=data_files(data))
     ship, told = (first.vessel, first.told) if vessel is None else equipped(vessel, data)
     if vessel is not None:
         ship = _same_ship(ship, first, vessel)
