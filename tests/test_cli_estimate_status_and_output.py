@@ -121,7 +121,8 @@ def test_the_table_holds_what_the_file_holds(run: Path, tmp_path: Path, capsys: 
     for name in MODEL_SHIP_TRUE.model.names:
         shown = re.findall(number, rows[name])
         assert len(shown) == 2
-        for (value, std, power), method in zip(shown, ("ls", "iv"), strict=True):
+        first = sorted(found, key=lambda method: not found[method]["in_vessel_file"])
+        for (value, std, power), method in zip(shown, first, strict=True):
             item, scale = found[method]["parameters"][name], 10.0 ** int(power or 0)
             assert float(std) * scale == pytest.approx(item["std"], rel=0.06)
             assert abs(float(value) * scale - item["value"]) <= 0.06 * item["std"]
@@ -171,6 +172,23 @@ def test_the_page_stands_alone_and_names_everything(told: tuple[Path, dict]) -> 
     identities = re.findall(r'\sid="([^"]+)"', page)
     assert len(identities) == len(set(identities))
     assert np.isclose(page.count("<svg"), 4)
+
+
+@pytest.mark.thorough
+def test_the_chosen_method_comes_first_in_every_table(run: Path, tmp_path: Path) -> None:
+    """A narrow window and a narrow terminal cut off the last columns."""
+    words = ["estimate", str(run), "--vessel", str(MODEL_SHIP), "--method", "ls", "iv", "oe", "--out", str(tmp_path)]
+    with redirect_stdout(io.StringIO()) as said:
+        assert main(words) == 0
+    found = json.loads((tmp_path / "estimate.json").read_text(encoding="utf-8"))
+    (chosen,) = (name for name, entry in found.items() if entry["in_vessel_file"])
+    assert chosen != next(iter(found))
+    page = (tmp_path / "estimate.html").read_text(encoding="utf-8")
+    heads = [re.findall(r"<th[^>]*>([\w-]+)", head) for head in re.findall(r"<thead>(.*?)</thead>", page, re.DOTALL)]
+    heads += [re.findall(r"[\w-]+", line) for line in said.getvalue().splitlines()]
+    across = [named for head in heads if {*(named := [word for word in head if word in found])} == {*found}]
+    assert len(across) >= 4, "the parameters and the fit, on the page and on the terminal"
+    assert all(named[0] == chosen for named in across)
 
 
 def test_help_names_every_estimator_and_all_that_may_be_unknown_and_explain_every_method(

@@ -101,6 +101,11 @@ class Assessment:
         """The estimate that goes into the vessel file."""
         return self.methods[self.chosen]
 
+    @property
+    def best_first(self) -> tuple[Assessed, ...]:
+        """All methods, that of the vessel file first: a narrow page cuts off the last columns of a table."""
+        return (self.best, *(item for item in self.methods if item is not self.best))
+
 
 AUTO = "auto"
 CONTINUOUS, EULER = "continuous", "euler"

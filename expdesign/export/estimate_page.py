@@ -155,12 +155,11 @@ def estimate_document(found: Assessment, ship: Vessel) -> Document:
 
 
 def _parameters(found: Assessment, model: VesselModel) -> Section:
-    explained = tuple(f"{item.method.name}\n\u00b1 standard deviation, 95 % interval" for item in found.methods)
-    chosen = next(number for number, item in enumerate(found.methods, start=2) if item is found.best)
+    explained = tuple(f"{item.method.name}\n\u00b1 standard deviation, 95 % interval" for item in found.best_first)
     of_page = Table(
         header=("Parameter\nits term", "Before", *explained),
         rows=parameter_rows(found, model),
-        shaded=chosen,
+        shaded=2,
         on="page",
     )
     return section(
@@ -171,7 +170,7 @@ def _parameters(found: Assessment, model: VesselModel) -> Section:
         "vessel file. The standard deviations account for correlated residuals. They measure random error only, not "
         "errors of the model structure.",
         Figure(
-            draw=partial(interval_figure, found.methods, found.best),
+            draw=partial(interval_figure, found.best_first, found.best),
             caption="Estimates of all methods with 95 % intervals. A parameter may be absent from the true ship if its "
             "interval contains zero.",
         ),
@@ -214,9 +213,9 @@ def _limits(found: Assessment) -> Section:
 
 def _runs(found: Assessment) -> Iterator[Section]:
     """Every run as it was measured, and simulated by the best method and those that simulate most runs."""
-    others = [item for item in found.methods if item is not found.best]
+    best, *others = found.best_first
     others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
-    drawn = (found.best, *others)[:DRAWN_METHODS]
+    drawn = (best, *others)[:DRAWN_METHODS]
     figures = []
     for number, (limits, run) in enumerate(zip(found.limits, found.best.runs, strict=True)):
         use = "test run, not used for estimation" if run.use == "test" else "used for estimation"
@@ -235,7 +234,7 @@ def _residuals(found: Assessment) -> Section:
             _listed(item.one_step.outputs, item.one_step.explained.tolist(), 3),
             _listed(item.one_step.outputs, item.one_step.autocorrelation[1].tolist(), 2),
         )
-        for item in found.methods
+        for item in found.best_first
     ]
     header = ("Method", "Explained share of the sample-to-sample variance", "Correlation of successive residuals")
     return section(
@@ -259,7 +258,7 @@ def _residuals(found: Assessment) -> Section:
 def _methods(found: Assessment) -> Iterator[Section]:
     """How each method worked, and what it warns of."""
     yield section("Methods and warnings")
-    for item in found.methods:
+    for item in found.best_first:
         diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
         warnings = notes_of((*item.estimate.warnings, *diverged), of=item.method.name)
         title = f"{item.method.name}: {item.method.title}"
@@ -277,7 +276,7 @@ def _how(found: Assessment, item: Assessed) -> str:
 
 def used_samples(found: Assessment) -> Table:
     """Samples used by each method and equation, those marked as steered, what became of these; where they differ."""
-    residuals = [item.estimate.residuals for item in found.methods]
+    residuals = [item.estimate.residuals for item in found.best_first]
     marked = any(batch.steered is not None for batch in found.record.batches)
     rows = [
         (
@@ -287,7 +286,7 @@ def used_samples(found: Assessment) -> Table:
             str(steered.samples),
             STEERED_WORDS[steered.treatment] if steered.samples else "",
         )
-        for item in found.methods
+        for item in found.best_first
         for steered in (item.estimate.steered,)
         if marked or any((own.rows_of < own.rows).any() for own in residuals)
     ]
@@ -349,7 +348,7 @@ def parameter_rows(found: Assessment, model: VesselModel) -> list[tuple[str, ...
         (
             f"{term.name}\n{term.expression} in d{term.equation}/dt",
             words.significant(float(value)),
-            *(_cell(item, term.name) for item in found.methods),
+            *(_cell(item, term.name) for item in found.best_first),
         )
         for term, value in zip(model.terms, model.parameters, strict=True)
     ]

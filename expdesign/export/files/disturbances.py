@@ -41,7 +41,7 @@ def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
 def disturbance_table(found: Assessment) -> Table:
     """A row for each disturbance that a method estimates."""
     rows = []
-    for item in found.methods:
+    for item in found.best_first:
         for own in _moments_of(item):
             std = own.covariance.diagonal() ** 0.5
             cells = [_pair(part, std[2 * n : 2 * n + 2]) for n, part in enumerate((own.mean, own.second, own.central))]

@@ -67,8 +67,8 @@ def breach_sentences(breaches: Sequence[Breach], runs: int) -> list[str]:
 def parameter_table(found: Assessment) -> Table:
     """Parameters down, methods across, value and standard deviation in each cell, for a terminal."""
     names = [name for name in found.best.model.names if any(name in item.estimate.names for item in found.methods)]
-    rows = [(name, *(_cell(item, name) for item in found.methods)) for name in names]
-    header = ("parameter", *(item.method.name for item in found.methods))
+    rows = [(name, *(_cell(item, name) for item in found.best_first)) for name in names]
+    header = ("parameter", *(item.method.name for item in found.best_first))
     return Table(title="Estimates, with standard deviations", header=header, rows=rows, on="terminal")
 
 
@@ -76,10 +76,10 @@ def fit_table(found: Assessment) -> Table:
     """Runs down, methods across, fit of every output in per cent in each cell."""
     outputs = " ".join(found.best.model.outputs)
     rows = [
-        (run.batch.name, run.use, *(_fits(item.runs[index]) for item in found.methods))
+        (run.batch.name, run.use, *(_fits(item.runs[index]) for item in found.best_first))
         for index, run in enumerate(found.best.runs)
     ]
-    header = ("run", "use", *(f"{item.method.name}: {outputs}" for item in found.methods))
+    header = ("run", "use", *(f"{item.method.name}: {outputs}" for item in found.best_first))
     title = "Fit of the simulated output to the measured one, in per cent"
     return Table(title=title, header=header, rows=rows, texts=2)
 
