@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -17,8 +16,8 @@ from expdesign.information import PrimitiveInformation, score_primitives
 from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Actuator, Limit, Response, Vessel, VesselModel, structure_terms
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).resolve().parent.parent / "scenarios"
 FREE = Limit()
 WIND = Environment(wind_to=np.array([3.0, 2.0]), current_to=np.array([0.1, -0.2]))
 """A sea in which every parameter of the full structure shows."""

@@ -11,8 +11,9 @@ from expdesign.signals import Batch, Commands, Trajectory
 from expdesign.simulation import CALM, Environment, measure, positions, simulate
 from expdesign.vessel import Sensors, Vessel
 from record_files import write_trial
+from scenario_files import SCENARIOS
 
-VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"
+VESSELS = SCENARIOS / "vessels"
 MODEL_SHIP, TUG = VESSELS / "model-ship.toml", VESSELS / "azimuth-30m.toml"
 MODEL_SHIP_TRUE = load_vessel(VESSELS / "model-ship-true.toml")
 TUG_TRUE = load_vessel(VESSELS / "azimuth-30m-true.toml")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import shapely
@@ -19,8 +18,9 @@ from expdesign.scenario import load_vessel
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.simulation import CALM
 from expdesign.vessel import Vessel
+from scenario_files import SCENARIOS
 
-VESSELS = Path(__file__).parents[1] / "scenarios" / "vessels"
+VESSELS = SCENARIOS / "vessels"
 
 
 def area(water: shapely.Geometry) -> SeaArea:

@@ -9,8 +9,8 @@ import numpy as np
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, simulate
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY = SCENARIOS / "story.toml"
 SHIP = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
 SAMPLES = 200

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"  # the examples
 SCENARIO = """
 [scenario]
 name = "square"

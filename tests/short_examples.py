@@ -12,9 +12,8 @@ from unittest.mock import patch
 from counted_work import counted_work
 from expdesign import workflows
 from expdesign.memory import VARIABLE
-from scenario_files import spoil
+from scenario_files import SCENARIOS, spoil
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SHORTER = {
     "story": {"total_s = 720.0": "total_s = 400.0"},
     "model-ship": {"total_s = 450.0": "total_s = 112.5"},

@@ -21,9 +21,7 @@ from expdesign.export.formats.check import check_rtz
 from expdesign.export.routes import build_bridge_route
 from expdesign.scenario import load_scenario
 from expdesign.workflows.steps.planned import MOST_RUNS, plan_problem
-from scenario_files import spoil, write_scenario
-
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
+from scenario_files import SCENARIOS, spoil, write_scenario
 
 
 def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:

@@ -13,10 +13,9 @@ from expdesign.durations import InformationFloor
 from expdesign.errors import NoAnswer
 from expdesign.foresight import design_runs, foresee, told_apart_from, told_apart_with
 from expdesign.scenario import load_scenario
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
-
-SCENARIOS = Path(__file__).parent.parent / "scenarios"
 
 
 def story(folder: Path, *lines: str) -> Path:

@@ -6,7 +6,6 @@ The ship is that of the bridge log. Her orders are given ten times a second, and
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,8 +21,9 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, measure, simulate
 from expdesign.vessel import Vessel, with_response_values
+from scenario_files import SCENARIOS
 
-SHIP = load_vessel(Path(__file__).parents[1] / "scenarios" / "vessels" / "logged-50m.toml")
+SHIP = load_vessel(SCENARIOS / "vessels" / "logged-50m.toml")
 FINE_S, ROW = 0.1, 10
 OPTIONS = EstimateOptions(methods=("oe",), mean="none")
 UNKNOWN = {

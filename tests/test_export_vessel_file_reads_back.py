@@ -10,9 +10,10 @@ from expdesign.errors import FileError, InputError
 from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
+from scenario_files import SCENARIOS
 from vessel_files import KVLCC2, write_vessel
 
-FILES = sorted((Path(__file__).parents[1] / "scenarios" / "vessels").glob("*.toml"))
+FILES = sorted((SCENARIOS / "vessels").glob("*.toml"))
 
 
 def same(a: Vessel, b: Vessel) -> bool:

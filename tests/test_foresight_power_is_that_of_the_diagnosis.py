@@ -1,7 +1,6 @@
 """What is foreseen of a diagnosis holds in simulated trials, obeys identities, and agrees with closed forms."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,8 +29,9 @@ from expdesign.foresight.information import SimulatedUnits, simulated_units
 from expdesign.foresight.power import share_shown
 from expdesign.scenario import load_scenario
 from expdesign.vessel import Vessel
+from scenario_files import SCENARIOS
 
-STORY = Path(__file__).parent.parent / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 RUNS = {"zigzag-speed-1.4": 1, "sway-zigzag-sway-0.6": 1, "telegraph": 1}
 
 

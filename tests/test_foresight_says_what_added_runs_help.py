@@ -1,7 +1,6 @@
 """Runs added to a trial raise the power of its diagnosis; the command writes it down, and refuses what does not fit."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +9,6 @@ from expdesign.cli import main
 from expdesign.foresight.added import Offers, of_one_manoeuvre, together
 from expdesign.foresight.effects import joined
 from short_examples import SHORTER, copied
-
-SCENARIOS = Path(__file__).parent.parent / "scenarios"
 
 
 def offers() -> Offers:

@@ -17,9 +17,10 @@ from expdesign.particulars.intervals import DRAWS
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios" / "vessels"
-COASTER = load_vessel(SCENARIOS / "coaster-80m.toml")
+VESSELS = SCENARIOS / "vessels"
+COASTER = load_vessel(VESSELS / "coaster-80m.toml")
 SPEED = 6.5
 
 

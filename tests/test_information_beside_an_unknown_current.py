@@ -1,7 +1,6 @@
 """Information that an unknown steady current, two parameters more, leaves about the ship."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,9 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, delivered, simulate
 from expdesign.vessel import Sensors
+from scenario_files import SCENARIOS
 
-TENDER = load_vessel(Path(__file__).parents[1] / "scenarios" / "vessels" / "tender-20m.toml")
+TENDER = load_vessel(SCENARIOS / "vessels" / "tender-20m.toml")
 EVEN = replace(TENDER, sensors=Sensors(velocity_mps=0.01, yaw_rate_radps=0.01))
 """As accurate in yaw as in surge and sway."""
 NAMES = TENDER.model.names

@@ -19,16 +19,16 @@ from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.simulation import CALM, Environment, delivered, simulate
 from expdesign.workflows.steps.design_problem import duration_problem
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
-ROOT = Path(__file__).parent.parent / "scenarios"
-SHIP = load_vessel(ROOT / "vessels/azimuth-30m.toml")
+SHIP = load_vessel(SCENARIOS / "vessels/azimuth-30m.toml")
 SEA = Environment(current_std_mps=0.05)
 NAMES = estimated_parameters(SHIP.model, [name for name in SHIP.model.names if name.startswith("W_")])
 FIXED = tuple(name for name in SHIP.model.names if name not in NAMES)
 
 
 def offset_runs():
-    return build_dictionary(SHIP, load_dictionary(ROOT / "dictionaries/offset-azimuth-30m.toml"))[:6]
+    return build_dictionary(SHIP, load_dictionary(SCENARIOS / "dictionaries/offset-azimuth-30m.toml"))[:6]
 
 
 def scores(excitation: str, mean: str = "complete"):
@@ -142,18 +142,18 @@ def test_predicted_covariance_follows_the_samples() -> None:
 @pytest.mark.thorough
 def test_a_dictionary_without_offset_is_refused_by_name(tmp_path: Path) -> None:
     text = (
-        (ROOT / "helsinki-hour.toml")
+        (SCENARIOS / "helsinki-hour.toml")
         .read_text(encoding="utf-8")
         .replace("[design]\n", '[design]\nexcitation = "required"\n')
     )
-    text = text.replace('"vessels/', f'"{ROOT}/vessels/').replace('"dictionaries/', f'"{ROOT}/dictionaries/')
+    text = text.replace('"vessels/', f'"{SCENARIOS}/vessels/').replace('"dictionaries/', f'"{SCENARIOS}/dictionaries/')
     path = tmp_path / "standard.toml"
-    path.write_text(text.replace('"areas/', f'"{ROOT}/areas/'), encoding="utf-8")
+    path.write_text(text.replace('"areas/', f'"{SCENARIOS}/areas/'), encoding="utf-8")
     case = load_scenario(path)
     with pytest.raises(NotInformative, match=r"dv/dt needs v and v_q, which all lack \(acceleration") as caught:
         duration_problem(case, scored(case))
     assert "Y_abs_v_v" in caught.value.parameters
-    path.write_text(text.replace("standard.toml", "offset-azimuth-30m.toml").replace('"areas/', f'"{ROOT}/areas/'))
+    path.write_text(text.replace("standard.toml", "offset-azimuth-30m.toml").replace('"areas/', f'"{SCENARIOS}/areas/'))
     case = load_scenario(path)
     problem = duration_problem(case, scored(case))
     assert solve_durations(problem).gap < 1e-3

@@ -7,7 +7,6 @@ cut and turned commands; with lag what is delivered changes within a sample, and
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,8 +21,8 @@ from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, delivered, simulate
 from expdesign.vessel import IDEAL, Response, Vessel
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 TENDER = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
 SPECS = load_dictionary(SCENARIOS / "dictionaries/tender-20m.toml")
 SEA = Environment(current_to=np.array([0.1, -0.2]))

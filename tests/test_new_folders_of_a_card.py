@@ -17,8 +17,9 @@ from expdesign.scenario import load_card, load_scenario, load_vessel
 from expdesign.workflows import new, scored
 from expdesign.workflows.commands.new import BLOCK, TEMPLATES, _sailable, _scaled, kind_of
 from expdesign.workflows.steps.design_problem import designed
+from scenario_files import SCENARIOS
 
-CARDS = {path.stem: path for path in (Path(__file__).parents[1] / "scenarios" / "cards").glob("*.toml")}
+CARDS = {path.stem: path for path in (SCENARIOS / "cards").glob("*.toml")}
 SHIPS = {path.stem: path for path in (Path(__file__).parent / "benchmarks" / "ships").glob("*.toml")}
 
 

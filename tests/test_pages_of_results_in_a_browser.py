@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from expdesign.cli import main
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.browser
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SHIP = f"{SCENARIOS}/vessels/logged-50m.toml"
 COMMANDS = {
     "import.html": ("import", f"{SCENARIOS}/logs/bridge.csv", "--vessel", SHIP),

@@ -20,10 +20,11 @@ from expdesign.particulars.model import SAMPLES, STEERING, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_card, load_vessel
 from expdesign.scenario.card_file import RudderTable, ThrusterTable
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-CARDS = Path(__file__).parents[1] / "scenarios" / "cards"
+CARDS = SCENARIOS / "cards"
 SHIPS = Path(__file__).parent / "benchmarks" / "ships"
 COASTER = Card(
     name="coaster",

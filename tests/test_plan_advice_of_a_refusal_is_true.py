@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,11 +33,11 @@ from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 from helm_case import catamaran
 from plan_case import acceleration, area, ship
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 WIDE = shapely.box(-400, -400, 400, 400)
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 
 def problem(

@@ -13,8 +13,8 @@ from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import STRUCTURES
 from expdesign.workflows.steps.planned import leg_remarks
 from plan_case import VESSELS, ship
+from scenario_files import SCENARIOS
 
-SCENARIOS = VESSELS.parent
 capability_module = importlib.import_module("expdesign.plan.control.ships")
 
 

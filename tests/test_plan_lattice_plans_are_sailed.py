@@ -13,11 +13,11 @@ import shapely
 from expdesign import workflows
 from expdesign.cli import main
 from outside_check import columns
+from scenario_files import SCENARIOS
 from short_examples import example_run
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SMALL = """
 [scenario]
 name = "small"

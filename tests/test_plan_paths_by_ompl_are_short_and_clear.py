@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +17,8 @@ from expdesign.plan.legs._ompl import roadmap_of, shortened
 from expdesign.scenario import load_scenario
 from expdesign.workflows import designed, plan_problem, scored
 from plan_case import leg_water, local_planner, random_path
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 BASIN = shapely.box(-500, -500, 500, 500)
 ENDS = np.array([0.0, -450.0]), np.array([0.0, 450.0])
 STRAIGHT = np.array([-450.0, -450.0]), np.array([-450.0, 450.0])

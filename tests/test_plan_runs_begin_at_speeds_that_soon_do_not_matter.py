@@ -1,7 +1,6 @@
 """Runs begin at another speed where it decays before it moves them, so slow ships need not go around in vain."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ from expdesign.scenario import load_scenario
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from plan_case import leg_water
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 OPEN = shapely.box(-400, -300, 400, 500)
 
 

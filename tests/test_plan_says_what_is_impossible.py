@@ -21,8 +21,8 @@ from expdesign.simulation import CALM, Environment
 from expdesign.workflows.commands import run
 from helm_case import coaster
 from plan_case import acceleration, area, place_in, ship
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 WIDE = shapely.box(-1000, -1000, 1000, 1000)
 
 

@@ -1,7 +1,6 @@
 """Estimates from simulated whole days of a plan have the standard deviations that its report states."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +14,10 @@ from expdesign.simulation import CALM, Environment, delivered
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 from whole_days import simulated_days
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 TRIALS = 24  # more take long: `tests/benchmarks/stated_accuracy.py` has 500
 UNKNOWN = Environment(current_std_mps=0.15)  # as the story's forecast
 FIRST_ORDER = 0.1  # what the noise beyond first order may add or take

@@ -9,15 +9,14 @@ from pathlib import Path
 import cloudpickle
 import pytest
 
-import dask_cluster
 from dask_cluster import local_cluster
 from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import InputError, NoPlan, UnknownName
 from expdesign.processes import as_finished, in_order, on_cluster
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.optional
-SCENARIOS = dask_cluster.ROOT / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "tender-20m-true.toml"
 
 

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 TRUE = load_vessel(SCENARIOS / "vessels" / "model-ship-true.toml")
 NOMINAL = load_vessel(SCENARIOS / "vessels" / "model-ship.toml")
 QUIET = replace(TRUE, sensors=Sensors(velocity_mps=0.02, yaw_rate_radps=0.02))

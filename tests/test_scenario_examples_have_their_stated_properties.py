@@ -7,9 +7,9 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.scenario import load_area, load_scenario, load_vessel
 from sample_files import SAMPLES, outside
+from scenario_files import SCENARIOS
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENARIOS = ROOT / "scenarios"
 
 # F. Ljungberg, doctoral thesis, Linköping University, Table 6.1 (true, nominal) and Table 9.1 (true, nominal).
 TABLE_6_1 = {

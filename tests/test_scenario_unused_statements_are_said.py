@@ -4,7 +4,6 @@ import re
 import tomllib
 from dataclasses import replace
 from functools import reduce
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate
 from expdesign.vessel import column_name
 from expdesign.workflows.outcome import Outcome
-from scenario_files import spoil, write_scenario
+from scenario_files import SCENARIOS, spoil, write_scenario
 
 WIND, CURRENT, UNREAD, CERTAIN = (
     "environment.wind_to",
@@ -28,8 +27,6 @@ WIND, CURRENT, UNREAD, CERTAIN = (
     "no term of the vessel",
     "exactly known",
 )
-
-EXAMPLES = Path(__file__).parents[1] / "scenarios"
 
 
 def loaded(tmp_path, *changes):
@@ -118,7 +115,7 @@ def test_parameters_are_said_to_be_exactly_known_exactly_where_all_draws_have_on
 
 @pytest.mark.parametrize(("name", "acts"), [("helsinki-hour", True), ("coaster", False), ("fast-boat-designed", False)])
 def test_a_stated_search_for_paths_is_said_not_to_act_exactly_where_legs_are_curves(name, acts):
-    case = load_scenario(EXAMPLES / f"{name}.toml")
+    case = load_scenario(SCENARIOS / f"{name}.toml")
     assert [line for line in case.remarks if "plan.paths" in line] == []
     stated = replace(case, plan=replace(case.plan, paths="visibility"))
     assert any("plan.paths does not act" in line for line in stated.remarks) is not acts
@@ -144,9 +141,9 @@ BESIDE = {
 
 @pytest.mark.parametrize("key", BESIDE)
 def test_keys_that_act_only_beside_others_are_said_not_to_act_alone(key):
-    content = tomllib.loads((EXAMPLES / "story.toml").read_text(encoding="utf-8"))
+    content = tomllib.loads((SCENARIOS / "story.toml").read_text(encoding="utf-8"))
     alone, acting = BESIDE[key]
-    entry = Entry(EXAMPLES / "story.toml")
+    entry = Entry(SCENARIOS / "story.toml")
     for changes, lines in (((), 0), ((alone,), 1), ((alone, acting), 0)):
         case = build_scenario(reduce(merged, changes, content), entry)
         assert len(said(case, f"{key} does not act")) == lines
@@ -161,9 +158,9 @@ def test_keys_that_act_only_beside_others_are_said_not_to_act_alone(key):
     ],
 )
 def test_sizes_of_what_nobody_asks_for_are_refused(changes, words):
-    content = tomllib.loads((EXAMPLES / "story.toml").read_text(encoding="utf-8"))
+    content = tomllib.loads((SCENARIOS / "story.toml").read_text(encoding="utf-8"))
     with pytest.raises(FileError, match=re.escape(words)):
-        build_scenario(merged(content, {"design": changes}), Entry(EXAMPLES / "story.toml"))
+        build_scenario(merged(content, {"design": changes}), Entry(SCENARIOS / "story.toml"))
 
 
 def test_a_calm_scenario_of_a_ship_known_in_part_has_nothing_to_say(tmp_path):

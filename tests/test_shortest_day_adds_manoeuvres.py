@@ -1,7 +1,6 @@
 """Manoeuvres that the shortest day adds pay for themselves, keep to the limits, and count the way they make good."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,10 +17,11 @@ from expdesign.workflows.steps.day import _with_additions
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 FEW = GrowSettings(families=("zigzag",), pool=8, rounds=1, seed=1)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,10 +20,9 @@ from expdesign.shortest_day.prices import LEAST_LEG_S, DraftedDay, _legs_s
 from expdesign.simulation import Environment
 from expdesign.workflows.steps.day import with_leg_speed
 from plan_case import acceleration, area, ship
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
-
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Runs that find no place do not end the search for the shortest day: others are tried."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,10 +10,11 @@ from expdesign.shortest_day import AccuracySettings, alternate, drafting, shorte
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import ready
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 
 
 class Found(Exception):

@@ -1,7 +1,6 @@
 """No motion of a class tells what is needed in less time than the bound says, and its proof stands on its own."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,13 +22,13 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 from rudder_ship import rudder_ship
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 AZIMUTHS = vessel("azimuth-30m")
 FASTEST = np.array([[-1.45, 1.45], [-0.7, 0.7], [-0.1, 0.1]])
 FEW = 4000  # boxes; the bound holds with any number of them
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SUBTRACTIONS = ("none", "batch", "complete")
 
 

@@ -1,7 +1,6 @@
 """Of several searches for the shortest day, the day is taken whose drawn trials end soonest."""
 
 from dataclasses import make_dataclass, replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,10 +14,11 @@ from expdesign.shortest_day import AccuracySettings
 from expdesign.workflows.steps import day as step
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 
 
 def found(monkeypatch, *outcomes):

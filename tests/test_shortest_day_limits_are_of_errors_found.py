@@ -1,7 +1,6 @@
 """Limits on standard deviations are judged by the errors that a track leaves, and forecast by the reference."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +14,11 @@ from expdesign.shortest_day import AccuracySettings, stated_accuracy
 from expdesign.vessel import Sensors
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 NORMAL_95 = 1.959963984540054
 
 

@@ -1,7 +1,5 @@
 """A day of a given length is kept to, tells as much as prices allow, and is refused where the way alone is longer."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,10 +11,11 @@ from expdesign.shortest_day.prices import Offer
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 DAY_S = 620.0
 
 

@@ -1,7 +1,5 @@
 """What runs are taken to tell in a day is what they tell along its way, an unknown current counted."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,10 +13,9 @@ from expdesign.simulation import simulate
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
-
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 
 @pytest.fixture(scope="module", params=["helsinki", "story"])

@@ -12,9 +12,8 @@ import scipy
 from expdesign.cli import main
 from expdesign.scenario import load_vessel
 from expdesign.vessel import VesselModel
-from step_case import GUESS, ROOT, TRUTH
-
-SCENARIOS = ROOT / "scenarios"
+from scenario_files import SCENARIOS
+from step_case import GUESS, TRUTH
 
 
 def done(*words: object) -> None:

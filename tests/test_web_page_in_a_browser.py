@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from expdesign.web.folder import MOST_UPLOAD_BYTES
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.browser
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 LONG_MS = 180_000
 WIDTHS = (768, 1366)
 SCREENS = ("", "sea", "ship", "manoeuvres", "plan", "whatif", "data", "files")

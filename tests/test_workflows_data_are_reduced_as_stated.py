@@ -14,10 +14,10 @@ from expdesign.signals import Commands
 from expdesign.vessel import Response, Sensors, Vessel
 from expdesign.workflows.steps.present import present_state
 from measured_trials import TUG_TRUE, tug_commands, write_run
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY, TENDER = SCENARIOS / "story.toml", load_vessel(SCENARIOS / "vessels/tender-20m.toml")
 FAULTS = Sensors(
     velocity_forward_m=6.0, velocity_delay_s=2.0, position_forward_m=6.0, yaw_rate_scale=1.1,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -17,10 +16,11 @@ from expdesign.shortest_day.values import DRAFT_POOL, DRAFT_SEARCHES
 from expdesign.workflows.steps import day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
+from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
+STORY = SCENARIOS / "story.toml"
 POOL = 8
 
 

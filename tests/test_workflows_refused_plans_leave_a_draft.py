@@ -16,8 +16,8 @@ from expdesign.progress import silent
 from expdesign.scenario import load_scenario
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import DRAFT, drafted, written
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY = load_scenario(SCENARIOS / "story.toml")
 RESULTS = {"plan.json", "track.csv", "commands.csv", "report.html", "cards.html", "route.rtz", "durations.json"}
 

@@ -14,8 +14,8 @@ from expdesign.memory import digest
 from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
 from expdesign.workflows.commands.validate import _method
+from scenario_files import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"
 OPTIONS = {"truth": TRUE, "trials": 4, "integrator": "euler", "jobs": 1}
 

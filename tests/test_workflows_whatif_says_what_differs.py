@@ -12,9 +12,8 @@ from expdesign.export.pages import document_html
 from expdesign.export.whatif_content import Case, WhatIfContent
 from expdesign.export.whatif_page import whatif_document
 from expdesign.scenario import load_scenario, load_variant
-from scenario_files import write_scenario
+from scenario_files import SCENARIOS, write_scenario
 
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, HOUR = SCENARIOS / "model-ship.toml", SCENARIOS / "helsinki-hour.toml"
 VARIANTS = sorted((SCENARIOS / "variants").glob("*.toml"))
 

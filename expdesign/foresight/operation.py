@@ -46,6 +46,7 @@ SIZES = (0.02, 0.05, 0.1, 0.2)  # relative changes of the ship that are simulate
 REFERENCES, REFERENCE_S = 8, 7200.0  # voyages of the reference, and their length [s]
 LARGEST_ANGLE_RAD, LARGEST_TURN = 0.6, 0.3  # of rudders and azimuths on voyages, and share of the largest turning force
 DAY_S, LEVEL = 86_400.0, 0.95
+FALSE_ALARM_DAYS = 30.0  # average time between false alarms, at least, as `monitor` has it without an option [d]
 MOST_VOYAGES = 10_000  # seeds apart between changes
 
 
@@ -229,7 +230,6 @@ def foresee_operation(
     *,
     voyages: int,
     hours: float = 2.0,
-    false_alarm_days: float = 30.0,
     sizes: Sequence[float] = SIZES,
     references: int = REFERENCES,
     seed: int = 0,
@@ -241,7 +241,6 @@ def foresee_operation(
         forecast: weather; each voyage draws its means and how they vary.
         voyages: of each change and size, and as many without a change for each.
         hours: length of a voyage [h].
-        false_alarm_days: average time between false alarms at least [d].
         sizes: shares of the changes.
         references: voyages of `REFERENCE_S` that the watch learns from.
 
@@ -262,7 +261,7 @@ def foresee_operation(
     calibration = calibrate(joined(parts))
     if not calibration.watched.any():
         raise InputError("with these sensors the reference determines no change well enough to watch for it")
-    limit = threshold(int(calibration.watched.sum()), false_alarm_days * DAY_S / stretch_s)
+    limit = threshold(int(calibration.watched.sum()), FALSE_ALARM_DAYS * DAY_S / stretch_s)
     kinds = [(item, size) for item in hidden for size in sizes]
     tasks: list[tuple[HiddenChange | None, float, int]] = [
         (item, size, seed + MOST_VOYAGES * place + number)  # the same voyages for every size
@@ -284,7 +283,7 @@ def foresee_operation(
         voyage_s=length_s,
         nominal=len(rest),
         false_alarms=sum(item.delay_s is not None for item in rest),
-        false_alarm_days=false_alarm_days,
+        false_alarm_days=FALSE_ALARM_DAYS,
         watched=tuple(c.words for c, seen in zip(changes, calibration.watched, strict=True) if seen),
         not_watched=tuple(c.words for c, seen in zip(changes, calibration.watched, strict=True) if not seen),
         reference_s=references * REFERENCE_S,

@@ -13,7 +13,12 @@ if TYPE_CHECKING:
         recorded_dictionary_json,
         subsets_json,
     )
-    from expdesign.export.files.disturbances import disturbance_table
+    from expdesign.export.files.disturbances import (
+        answer_sentence,
+        current_sentence,
+        disturbance_table,
+        unstated_sentences,
+    )
     from expdesign.export.files.estimates import (
         breach_sentences,
         estimate_json,
@@ -48,7 +53,6 @@ if TYPE_CHECKING:
         toml_table,
         toml_value,
     )
-    from expdesign.export.files.unstated import answer_sentence, current_sentence, unstated_sentences
     from expdesign.export.files.vessel_file import vessel_toml
 else:
     __getattr__, __all__ = load_on_use(__name__, __file__)

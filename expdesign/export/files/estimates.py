@@ -19,9 +19,8 @@ from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
 from expdesign.export import words
 from expdesign.export.document import Table
-from expdesign.export.files.disturbances import disturbance_entries
+from expdesign.export.files.disturbances import disturbance_entries, unstated_sentences
 from expdesign.export.files.text import entry, finite, named_finite, strict_json, valued
-from expdesign.export.files.unstated import unstated_sentences
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.vessel import Vessel
 

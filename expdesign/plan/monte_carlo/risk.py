@@ -337,12 +337,12 @@ def trials_needed(confidence: float) -> int:
     return int(np.clip(needed, TRIALS, MOST_TRIALS))
 
 
-def upper_limit(count: int, trials: int, *, confidence: float = UPPER_SHARE) -> float:
-    """Upper confidence limit of a probability of which `count` cases were seen among trials.
+def upper_limit(count: int, trials: int) -> float:
+    """Upper limit, at 95 % confidence, of a probability of which `count` cases were seen among trials.
 
     Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
     """
-    return 1.0 if count >= trials else float(scipy.special.betaincinv(count + 1, trials - count, confidence))
+    return 1.0 if count >= trials else float(scipy.special.betaincinv(count + 1, trials - count, UPPER_SHARE))
 
 
 def failed_chance_constraint(
