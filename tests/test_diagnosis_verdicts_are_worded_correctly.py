@@ -1,7 +1,9 @@
 """The verdict says what the simulation lacks, how much the error falls, and what would distinguish causes."""
 
+import itertools
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +11,13 @@ import pytest
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES
 from expdesign.diagnosis.accuracy import Accuracy
-from expdesign.diagnosis.conclusions.findings import error_reductions_of, note_on_random_current
-from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, as_sign, remarks, verdict
+from expdesign.diagnosis.conclusions.findings import (
+    error_reductions_of,
+    note_beside_the_same_fit,
+    note_on_predictions,
+    note_on_random_current,
+)
+from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, as_sign, doubt, remarks, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding, Lead, Unexplained
@@ -42,6 +49,13 @@ def finding(cause: str, error_reductions=REDUCTIONS, alternatives=(), would_tell
         gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=tuple(alternatives),
         would_tell_apart=would_tell_apart, explanation="", likelihood_gain=30.0, keys=(),
     )  # fmt: skip
+
+
+NO_GAIN = {
+    "error_reductions": tuple(ErrorReduction(output=name, share=0.2, low=-0.2, high=0.5) for name in OUTPUTS),
+    "gain": 0.3, "gain_interval": (-0.5, 1.0),
+}  # fmt: skip
+"""What is not certain of simulations."""
 
 
 def test_a_verdict_names_the_alternative_and_the_manoeuvre():
@@ -110,15 +124,65 @@ def test_a_gain_is_told_by_the_output_that_improves_most_of_those_that_surely_do
     little = ((0.7, 0.004, 0.9), (0.0, -0.1, 0.1), (0.0, -0.1, 0.1))  # which is not "from 0 %"
     assert "by 70 % (0.4 to 90 %)" in verdict([finding("current", error_reductions=little)], BEFORE)
     none = finding("current", error_reductions=((0.004, 0.001, 0.01),) * 3)
-    assert "reduces no error for certain" in verdict([none], BEFORE)
+    assert "raises the mean fit by 1.0 points (0.5 to 1.5) on runs" in verdict([none], BEFORE)
+    assert "reduces no error for certain" in verdict([replace(none, gain_interval=(-0.1, 1.5))], BEFORE)
+    assert "reduces no error for certain" in verdict([replace(none, gain=0.04, gain_interval=(0.02, 0.06))], BEFORE)
+
+
+def combinations():
+    """Findings with all that may and may not be certain of them."""
+    reductions = (finding("wind").error_reductions, NO_GAIN["error_reductions"])
+    gains, ahead = ((1.0, (0.5, 1.5)), (0.3, (-0.5, 1.0))), (REDUCTION_AHEAD, None)
+    for p_value, fall, (gain, interval), predicted in itertools.product((1e-6, 0.42), reductions, gains, ahead):
+        yield replace(
+            finding("load_change"), p_value=p_value, error_reductions=fall, gain=gain, gain_interval=interval,
+            predicted=predicted,
+        )  # fmt: skip
+
+
+def certain_of(item):
+    """Whether chance is excluded, and whether simulations of held-out data get better, by all intervals given."""
+    by_output = any(one.low > 0.0 for one in item.error_reductions)
+    return item.p_value < 0.05, by_output or item.gain_interval[0] > 0.0
+
+
+CLAIMS = {
+    (True, True): ("he simulation lacks ", ""),
+    (True, False): ("he record shows ", "whether simulations get better with {} is not certain"),
+    (False, True): ("imulations get better with ", "chance may explain that"),
+    (False, False): ("he likeliest cause is ", "nothing is certain of {}"),
+}
+"""By what is certain: the beginning of a claim, and what is left open."""
+
+
+@pytest.mark.parametrize("item", [*combinations()])
+def test_no_two_sentences_of_a_verdict_contradict_each_other_whatever_is_certain(item):
+    """Chance is excluded or not; simulations of an output, of all or of none get better; predictions do or do not."""
+    certain, better = certain_of(item)
+    begin, open_still = CLAIMS[certain, better]
+    inertia = "the correct inertia" if certain and better else "an inertia unlike the file's"
+    if better:
+        gained = "sway error" if item.error_reductions[1].low > 0.0 else "raises the mean fit"
+    else:
+        gained = "predictions from sample to sample" if item.predicted else "reduces no error for certain"
+    assert doubt(item).rstrip(".").lower() == open_still.format("it")
+    for other in (None, *combinations()):
+        both = [item] if other is None else [item, replace(other, cause="wind")]
+        what, sure, todo = verdict(both, BEFORE).split(". ")
+        alike = other is not None and certain_of(other) == (certain, better)
+        assert f"{begin}{inertia}{' and wind' if alike else ''}" in what
+        assert open_still.format("them" if alike else "it") in what
+        assert gained in sure.split(" and adding wind ")[0]
+        assert ("lacks" in what) is any(certain_of(one) == (True, True) for one in both)
+        assert ("correct" in what + sure) is (certain and better)
+        nothing = not any(sum(map(certain_of, both), ()))
+        assert todo.startswith("Keep the vessel file" if nothing else "Use the extended vessel file")
 
 
 def test_what_shows_in_predictions_alone_is_in_the_record_and_not_lacking_in_simulations():
     """Beside what simulations show, too, and several with one verb."""
-    open_ones = ((0.2, -0.2, 0.5), (0.0, -2.0, 0.7), (0.1, -1.0, 0.6))
     delay, gyro = (
-        replace(finding(cause, error_reductions=open_ones), predicted=REDUCTION_AHEAD)
-        for cause in ("actuator_delay", "gyro_scale")
+        replace(finding(cause), **NO_GAIN, predicted=REDUCTION_AHEAD) for cause in ("actuator_delay", "gyro_scale")
     )
     late, scale = "the dead time of the actuators", "the scale of the rate gyro"
     assert verdict([delay], BEFORE) == (
@@ -136,8 +200,8 @@ def test_what_shows_in_predictions_alone_is_in_the_record_and_not_lacking_in_sim
 @pytest.mark.parametrize("name", MISSING_EFFECTS)
 def test_only_what_the_simulation_lacks_for_certain_is_called_correct(name):
     """Not what a record shows in predictions alone, a candidate, what was refused, or other answers to these."""
-    shown = replace(finding(name, error_reductions=((0.2, -0.2, 0.5),) * 3), predicted=REDUCTION_AHEAD)
-    others = replace(finding("roll_coupling", alternatives=[name]), predicted=REDUCTION_AHEAD)
+    shown = replace(finding(name), **NO_GAIN, predicted=REDUCTION_AHEAD)
+    others = replace(finding("roll_coupling", alternatives=[name]), **NO_GAIN, predicted=REDUCTION_AHEAD)
     lead = Lead(name, 0.5, (-0.6, 1.2))
     told = [verdict([shown], BEFORE), verdict([shown, others], BEFORE), verdict([], BEFORE, signs=(lead,))]
     told += remarks("runs", None, (lead,), (name,), ())
@@ -146,15 +210,26 @@ def test_only_what_the_simulation_lacks_for_certain_is_called_correct(name):
     assert f"lacks {MISSING_EFFECTS[name]}." in verdict([finding(name)], BEFORE)
 
 
+@pytest.mark.parametrize("name", MISSING_EFFECTS)
+@pytest.mark.parametrize("beside_stated", [True, False])
+def test_notes_which_do_not_know_what_is_certain_call_nothing_correct(name, beside_stated):
+    chosen = SimpleNamespace(candidate=SimpleNamespace(cause=name), parameters=())
+    kept = SimpleNamespace(steps=(SimpleNamespace(chosen=chosen),), beside_stated=beside_stated)
+    held = HeldOut(squared_error=np.ones((3, 2)), squared_deviation=2 * np.ones((3, 2)))
+    told = [*note_beside_the_same_fit(kept), *note_on_predictions(held, held, kept, kept.steps, 0)]
+    assert as_sign(MISSING_EFFECTS[name]) in told[0]
+    assert not [text for text in told if "the correct" in text]
+
+
 def test_values_that_a_record_shows_are_those_that_the_file_does_not_have():
     """Of the file's own the numbers are not; every one of several has its name."""
     u, r = (Estimate(name=name, value=-0.5, std=0.01, unit="", stated=-0.3) for name in ("X_u", "N_r"))
-    one = replace(finding("parameters"), keys=("theta:X_u",), estimates=(u,), predicted=REDUCTION_AHEAD)
+    one = replace(finding("parameters"), **NO_GAIN, keys=("theta:X_u",), estimates=(u,))
     size = "-0.500 \N{PLUS-MINUS SIGN} 0.010, the file says -0.3"
     assert verdict([one], BEFORE).startswith(f"The record shows a value of X_u unlike the file's ({size}), but whether")
-    two = replace(one, keys=("theta:X_u", "theta:N_r"), estimates=(u, r), predicted=None)
+    two = replace(finding("parameters"), keys=("theta:X_u", "theta:N_r"), estimates=(u, r))
     assert f"lacks the correct values of X_u and N_r (X_u {size}; N_r {size}). Adding them" in verdict([two], BEFORE)
-    inertia = replace(finding("load_change"), predicted=REDUCTION_AHEAD)
+    inertia = replace(finding("load_change"), **NO_GAIN)
     assert verdict([inertia], BEFORE).startswith("The record shows an inertia unlike the file's, but whether")
 
 

@@ -25,6 +25,7 @@ SLOW_S = 20.0  # periods longer than this [s], or than 40 samples, count as slow
 UNSTABLE_GROWTH = 5.0  # growth of an error over a run above which the ship is unstable
 # share of the squared misfit above which its parts have opposite signs, and their sizes no meaning
 CANCELLING_SHARE = 1.1
+LEAST_SQUARED_ERROR = 1e-16  # in units of the outputs' standard deviations, below which a difference is rounding
 ESTIMATION, TEST = "estimation", "test"
 
 
@@ -83,10 +84,12 @@ def _simulated(model: VesselModel, batch: Batch, *, wind: bool, integration: Int
 #
 # so it is the sum of the propagated parts of the one-step residuals eps: their mean over the run (a constant unmodelled
 # force, or a wrong parameter with the same effect), their slow part (gusts, current, missing terms), and the rest
-# (measurement noise, fast disturbances). Shares are projections on the misfit and add up to one, apart from the error
-# of the half-way slope. The same slopes give the growth of an initial error. Where it grows, the ship is unstable under
-# the recorded inputs, for any model: the recorded steering stabilised her, but the simulation does not react to the
-# motion.
+# (measurement noise, fast disturbances). Shares are projections on the misfit and add up to one: each slope is changed
+# by as little as makes it carry e(k) to e(k+1) - eps(k), the difference that f makes of y and x (a secant in Broyden's
+# sense; C. G. Broyden, Mathematics of Computation 19 (1965), 577-593). Without that they miss what the slope half-way
+# does of f's curvature. The slopes as they are give the growth of an initial error. Where it grows, the ship is
+# unstable under the recorded inputs, for any model: the recorded steering stabilised her, but the simulation does not
+# react to the motion.
 
 
 @sealed(constant="n", slow="n", quick="n", parameters="n", ceiling_percent="n", ahead_rms="n", ahead_share="n")
@@ -183,16 +186,26 @@ def _shares(stretches: Stretches, values: Array, measured: Array, misfit: Array)
     eps = measured[1:] - one_step.states(held, measured[:-1])[1]
     half_way = np.stack([measured[:-1] - misfit[:-1] / 2, measured[1:]])
     A = one_step.sensitivities(held, half_way)[1][1]  # (k, n, n)
+    scale = np.where(measured.std(axis=0) > 0, measured.std(axis=0), 1.0)
+    secant = _secants(A, misfit[:-1], misfit[1:] - eps, scale)
     mean = np.broadcast_to(eps.mean(axis=0), eps.shape)
     slow = _slow_part(eps - mean, stretches.sample_time_s)
     parts = np.stack([mean, slow, eps - mean - slow], axis=2)
     grown, error = np.zeros((len(eps) + 1, *parts.shape[1:])), np.eye(eps.shape[1])
     for k in range(len(eps)):
-        grown[k + 1] = A[k] @ grown[k] + parts[k]
+        grown[k + 1] = secant[k] @ grown[k] + parts[k]
         error = A[k] @ error
-    scale = np.where(measured.std(axis=0) > 0, measured.std(axis=0), 1.0)
     growth = float(np.linalg.norm(error * scale / scale[:, None], ord=2))
     return np.einsum("knc,kn->cn", grown, misfit) / np.maximum((misfit**2).sum(axis=0), 1e-300), growth
+
+
+def _secants(A: Array, error: Array, reached: Array, scale: Array) -> Array:
+    """(k, n, n) matrices nearest to A that carry errors (k, n) to those reached (k, n), in units of a scale (n,)."""
+    towards = error / scale**2
+    size = (error * towards).sum(axis=1)
+    missed = reached - np.einsum("kij,kj->ki", A, error)
+    missed[size < LEAST_SQUARED_ERROR] = 0.0
+    return np.asarray(A + missed[:, :, None] * (towards / np.maximum(size, LEAST_SQUARED_ERROR)[:, None])[:, None, :])
 
 
 def _one_step(stretches: Stretches) -> Compiled:
@@ -260,7 +273,8 @@ def sentence(limits: Limits, run: RunCheck) -> str:
     if max(abs(share) for _, share in causes) > CANCELLING_SHARE:
         parts = "parts of opposite sign, so no single cause can be named"
     doubt = limits.parameters[worst]
-    uncertain = f" Parameter uncertainty explains {f'{100 * doubt:.0f} %' if not doubt >= 1 else 'all of it'}."
+    much = f"{100 * doubt:.0f} % of it" if not doubt >= 1 else "all of it"
+    uncertain = f" Among all these, errors of the parameters as large as stated would make {much}."
     ceiling = limits.ceiling_percent[worst]
     quiet = f" Noise alone limits this fit to {ceiling:.0f} %." if ceiling < 95 else ""
     return f"The worst output is {limits.outputs[worst]}. Its squared error: {parts}.{uncertain}{quiet} {tail}"

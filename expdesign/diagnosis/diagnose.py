@@ -14,7 +14,6 @@ from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
     error_reductions_of,
     finding_of,
-    missing_effect,
     note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,
@@ -28,6 +27,7 @@ from expdesign.diagnosis.conclusions import (
     notes_on_found_again,
     notes_on_rejected,
     remarks,
+    sign_of,
     unit_name,
     verdict,
 )
@@ -423,7 +423,8 @@ def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ..
         ]
         alone = parameters_alone(chosen.kept, chosen.held, chosen.validation)
         if alone is not None and chosen.wrong is None:
-            cause = missing_effect(chosen.kept.steps[0].chosen.candidate.cause)
+            first = chosen.kept.steps[0].chosen
+            cause = sign_of(first.candidate.cause, first.parameters)
             notes.append(note_on_parameters_alone(chosen.before, alone, chosen.held[1], cause, seed))
         elif alone is None and chosen.kept.first.keys:
             notes += note_on_nuisance(chosen.before, chosen.held[0], seed)

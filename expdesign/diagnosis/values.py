@@ -58,8 +58,8 @@ class Finding:
     explanation: str  # a sentence or two
     likelihood_gain: float  # twice the log likelihood gained
     keys: tuple[str, ...]  # effects of the extended model, in the order of the estimates
-    # where no simulated error falls visibly, the share by which the squared whitened error of predictions of held-out
-    # data from one sample to the next falls, if that is certain
+    # where no simulated error of an output falls visibly, the share by which the squared whitened error of predictions
+    # of held-out data from one sample to the next falls, if that is certain
     predicted: ErrorReduction | None = None
     alternatives: tuple[str, ...] = ()
 

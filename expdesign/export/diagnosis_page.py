@@ -13,7 +13,14 @@ from expdesign.conventions import plus_minus
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.accuracy import Accuracy, mean_residual
 from expdesign.diagnosis.causes import CAUSES
-from expdesign.diagnosis.conclusions import DIVERGED_FIT, accuracy_in_words, alternatives, has_diverged, manoeuvre
+from expdesign.diagnosis.conclusions import (
+    DIVERGED_FIT,
+    accuracy_in_words,
+    alternatives,
+    doubt,
+    has_diverged,
+    manoeuvre,
+)
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction, Estimate
 from expdesign.export import words
@@ -335,7 +342,7 @@ def _finding(found: Diagnosis, index: int) -> Section:
     what = "Missing acceleration" if force else "Measured minus simulated"
     return section(
         f"{index + 1}. {cause_title(item.cause)}",
-        Markup("<b>{}</b>").format(item.explanation),
+        Markup("<b>{}</b> {}").format(item.explanation, doubt(item)),
         Table(header=("Quantity", "Value"), rows=[row for row in rows if row[1]], texts=2, on="page"),
         _alternatives(item),
         Figure(

@@ -117,7 +117,7 @@ def _names(best: Assessed, chosen: np.ndarray) -> str:
 
 FACTOR = 1.959964  # standard deviations to either side that hold 95 % of a normal distribution
 LIMIT_HEADER = (
-    "Run", "Output", "Fit", "Constant force", "Slow forces", "Fast forces, noise", "Parameter uncertainty",
+    "Run", "Output", "Fit", "Constant force", "Slow forces", "Fast forces, noise", "Uncertain parameters, among these",
     "Fit limit by noise", "Error growth over the run", f"Error of {AHEAD_S:g} s prediction",
 )  # fmt: skip
 
@@ -325,9 +325,10 @@ PREDICTIONS = (
 MISFIT = (
     "The misfit of a simulation is the accumulated effect of its one-step errors. These are split into their mean over "
     "the run, their slow part and the rest. Each share of the squared misfit is computed by propagating one part "
-    "alone; shares are negative where parts cancel. The last column predicts from measured velocities and is relative "
-    "to the standard deviation of the motion. If it is small while the fit is bad, errors accumulate or the ship is "
-    "unstable; the model itself can still be useful."
+    "alone; shares are negative where parts cancel, and add up to all of it. Errors of the parameters as large as "
+    "stated are no further part: they act through these. The last column predicts from measured velocities and is "
+    "relative to the standard deviation of the motion. If it is small while the fit is bad, errors accumulate or the "
+    "ship is unstable; the model itself can still be useful."
 )
 DISTURBANCES = (
     "Velocities to north (N) and east (E) over ground, with standard deviations to first order. Mean current and "

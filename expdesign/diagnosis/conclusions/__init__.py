@@ -20,10 +20,11 @@ from expdesign.diagnosis.conclusions.verdict import (
     DIVERGED_FIT,
     accuracy_in_words,
     alternatives,
+    doubt,
     has_diverged,
     manoeuvre,
-    missing_effect,
     remarks,
+    sign_of,
     unit_name,
     verdict,
 )

@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values, rounded, wind_can_be_told
-from expdesign.diagnosis.conclusions.verdict import as_sign, effect_in_words, has_diverged, missing_effect
+from expdesign.diagnosis.conclusions.verdict import effect_in_words, has_diverged, sign_of
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import (
     AHEAD_S,
@@ -216,7 +216,7 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
 
 def _as_sign(step: Step) -> str:
     """The effect that a cause is a sign of."""
-    return as_sign(missing_effect(step.chosen.candidate.cause, step.chosen.parameters))
+    return sign_of(step.chosen.candidate.cause, step.chosen.parameters)
 
 
 def _p_value_left(step: Step, kept: Selection) -> float:
@@ -326,7 +326,7 @@ def note_on_predictions(
         "each with the same model re-estimated without it: the parameters of "
         "the vessel file may have been fitted to these data too. "
         f"{f'The model with {names} predicts worse for certain. ' if names else ''}"
-        f"On the model as its file states it, the gain of {missing_effect(kept.steps[0].chosen.candidate.cause)} with "
+        f"On the model as its file states it, the gain of {_as_sign(kept.steps[0])} with "
         f"all parameters re-estimated is {gain:+.1f} points ({low:.1f} to {high:.1f}).",
     )
 
@@ -335,7 +335,7 @@ def note_beside_the_same_fit(kept: Selection) -> tuple[str, ...]:
     """What the gain of the first cause is relative to, where it is not the model in use."""
     return (
         "The parameters of the vessel file may have been fitted to these data too. So the gain of "
-        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} is that on the model re-estimated without it as it is "
+        f"{_as_sign(kept.steps[0])} is that on the model re-estimated without it as it is "
         "with it.",
     )
 

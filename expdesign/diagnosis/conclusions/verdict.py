@@ -8,6 +8,7 @@ What else is known goes into remarks.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import Enum
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, SENSOR_CAUSES
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
+from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
 from expdesign.values import Array
 
@@ -42,7 +44,7 @@ SENSORS = tuple(cause.name for cause in SENSOR_CAUSES)
 WEATHER = ("current", "wind")
 
 
-def missing_effect(cause: str, parameters: Sequence[str] = ()) -> str:
+def _missing_effect(cause: str, parameters: Sequence[str] = ()) -> str:
     """Missing effect of a cause, e.g. of "missing_term:Y_r"; wrong values of parameters by their names."""
     kind, _, term = cause.partition(":")
     if kind == "unlisted_term":
@@ -57,7 +59,12 @@ def effect_in_words(cause: str, keys: Sequence[str]) -> str:
     """Missing effect of a cause with these effects; an offset is named after its actuators."""
     kind, _, group = (keys or ("",))[0].partition(":")
     parameters = [key.split(":", 1)[1] for key in keys if key.startswith("theta:")]
-    return f"the offset of the {group} angle" if kind == "offset" else missing_effect(cause, parameters)
+    return f"the offset of the {group} angle" if kind == "offset" else _missing_effect(cause, parameters)
+
+
+def sign_of(cause: str, parameters: Sequence[str] = ()) -> str:
+    """Missing effect of a cause where nothing says that it is certain."""
+    return as_sign(_missing_effect(cause, parameters))
 
 
 def as_sign(effect: str) -> str:
@@ -67,9 +74,40 @@ def as_sign(effect: str) -> str:
     return effect if noun == effect else f"{article}{noun} unlike the file's"
 
 
+class Claim(Enum):
+    """What is said of a finding, the surest first."""
+
+    LACKED = "the simulation lacks {what}"
+    BETTER = "simulations get better with {what}, but chance may explain that"
+    SHOWN = "the record shows {what}, but whether simulations get better with {them} is not certain"
+    LIKELY = "the likeliest cause is {what}, but nothing is certain of {them}"
+
+    @staticmethod
+    def of(item: Finding) -> Claim:
+        """What may be said: by its p-value, and by whether held-out data are simulated better with it for certain.
+
+        Predictions from sample to sample alone make nothing more certain than its p-value does.
+        """
+        if item.p_value <= SELECTION_TUNING.level:
+            return Claim.LACKED if simulates_better(item) else Claim.SHOWN
+        return Claim.BETTER if simulates_better(item) else Claim.LIKELY
+
+
+def doubt(item: Finding) -> str:
+    """A sentence of what is not certain of a finding; empty where all is."""
+    but = Claim.of(item).value.partition(", but ")[2]
+    return f"{_capital(but.format(them='it'))}." if but else ""
+
+
+def simulates_better(item: Finding) -> bool:
+    """Whether the simulated error of some output, or the mean fit, of held-out data gets visibly better for certain."""
+    by_mean_fit = item.gain >= SELECTION_TUNING.least_gain_points and item.gain_interval[0] > 0.0
+    return by_mean_fit or any(reduction.is_certain for reduction in item.error_reductions)
+
+
 def _of(item: Finding, effect: str) -> str:
-    """An effect as the simulation lacks it, or as the record shows it, which shows no correct values."""
-    return effect if item.predicted is None else as_sign(effect)
+    """An effect as the simulation lacks it, or as it is told while that is not certain."""
+    return effect if Claim.of(item) is Claim.LACKED else as_sign(effect)
 
 
 def lacking(item: Finding) -> str:
@@ -79,7 +117,7 @@ def lacking(item: Finding) -> str:
 
 def alternatives(item: Finding) -> list[str]:
     """What the data cannot tell from a finding, in words."""
-    words = item.alternatives or [missing_effect(name) for name in item.not_distinguishable_from]
+    words = item.alternatives or [_missing_effect(name) for name in item.not_distinguishable_from]
     words = [word for word in dict.fromkeys(_of(item, word) for word in words) if word != lacking(item)]
     return [*words[:MOST_NAMED], *["others"] * (len(words) > MOST_NAMED)]
 
@@ -92,11 +130,14 @@ def manoeuvre(name: str) -> str:
 def benefit(item: Finding) -> str:
     """Effect of adding it, told by the output whose error falls most, of those of which that is certain.
 
-    E.g. "cuts the sway error by 52 % (45 to 60 %)".
+    E.g. "cuts the sway error by 52 % (45 to 60 %)". Where there is none, by the mean fit, then by predictions.
     """
     certain = [reduction for reduction in item.error_reductions if reduction.is_certain]
     if certain:
         return _reduction(max(certain, key=lambda reduction: reduction.share))
+    if simulates_better(item):
+        low, high = item.gain_interval
+        return f"raises the mean fit by {item.gain:.1f} points ({low:.1f} to {high:.1f})"
     return "reduces no error for certain" if item.predicted is None else _prediction(item.predicted)
 
 
@@ -202,15 +243,11 @@ def _is_unfit(before: Accuracy, findings: Sequence[Finding], unexplained: Unexpl
 
 
 def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplained | None) -> list[str]:
-    """Three sentences of what is missing, or of what only shows from one sample to the next."""
-    lacked, shown = ([item for item in findings if (item.predicted is None) is alone] for alone in (True, False))
+    """Three sentences: what is missing, the surest first, how much better data are explained, and what to do."""
     what = []
-    if lacked:
-        what.append(f"the simulation lacks {listed(_named(lacked))}")
-    if shown:
-        them = "them" if len(shown) > 1 else "it"
-        but = f"whether simulations get better with {them} is not certain"
-        what.append(f"the record shows {listed(_named(shown))}, but {but}")
+    for claim in Claim:
+        if some := [item for item in findings if Claim.of(item) is claim]:
+            what.append(claim.value.format(what=listed(_named(some)), them="them" if len(some) > 1 else "it"))
     sure = _benefits(findings, unit)
     if unexplained is not None:
         sure += f"; much remains unexplained, {_fits(unexplained)}"
@@ -254,6 +291,8 @@ def _advice(findings: Sequence[Finding]) -> str:
             return f"Sail {manoeuvre(item.would_tell_apart)} to tell {lacking(item)} from {listed(others, 'or')}"
     if any(alternatives(item) for item in findings):
         return "Sail other manoeuvres to tell these apart, before the vessel file is changed"
+    if all(Claim.of(item) is Claim.LIKELY for item in findings):
+        return f"Keep the vessel file; {MORE_RUNS}"
     causes = [item.cause for item in findings]
     if causes[0] in SENSORS:
         return "Correct the instruments; the extended vessel file describes them as they were"
@@ -287,7 +326,7 @@ def remarks(
     found = []
     if refused:
         names, verb = (
-            listed([as_sign(missing_effect(cause)) for cause in refused]),
+            listed([sign_of(cause) for cause in refused]),
             "it is" if len(refused) == 1 else "they are",
         )
         found.append(f"With {names} the simulation of these data would diverge or be worse, so {verb} not written.")
@@ -343,7 +382,7 @@ def _lead(lead: Lead) -> str:
     low, high = lead.gain_interval
     but = "; but whole runs are simulated worse with it, or too few show it" if low > 0.0 else ""
     gain = f"{lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f}{but}"
-    return f"{as_sign(missing_effect(lead.cause, lead.parameters))} ({gain})"
+    return f"{sign_of(lead.cause, lead.parameters)} ({gain})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
