@@ -17,7 +17,7 @@ FLOORS = {
         ("input_files", "processes", "requests"),
         ("memory",),
         ("conventions", "saved", "values"),
-        ("signals", "sea_area", "waves"),
+        ("own_units", "signals", "sea_area", "waves"),
         ("vessel",),
         ("simulation", "records"),
         ("reduction",),

@@ -109,6 +109,28 @@ def test_a_contradiction_is_told_and_agreement_is_not() -> None:
     assert "X_abs_u_u" in warning
 
 
+@pytest.mark.parametrize("parameter", [0, 1])
+def test_what_is_joined_does_not_depend_on_units(parameter: int) -> None:
+    """A parameter held at the end of its range takes the others with it by as much."""
+    size = np.ones(3)
+    size[parameter] = 1e9
+    before, model = found(2), known([0.5, 2.0])
+    held = float(with_prior(before, model).values[0]) + 0.4
+    plain = with_prior(before, replace(model, parameter_range={"X_u": (held, np.inf)}))
+    other = with_prior(
+        replace(
+            before, values=size[:2] * before.values, joint_covariance=np.outer(size, size) * before.joint_covariance,
+            covariance=np.outer(size[:2], size[:2]) * before.covariance,
+        ),
+        replace(
+            model, parameters=size[:2] * model.parameters, parameter_std=size[:2] * model.parameter_std,
+            parameter_range={"X_u": (size[0] * held, np.inf)},
+        ),
+    )  # fmt: skip
+    np.testing.assert_allclose(other.values / size[:2], plain.values, rtol=1e-6)
+    np.testing.assert_allclose(other.nuisance_values, plain.nuisance_values, rtol=1e-6)
+
+
 def test_values_outside_a_stated_range_move_to_its_end_and_the_others_with_them() -> None:
     """The most probable point of a normal density on a half-space: on its face, others by their correlation."""
     before, model = found(2), known([0.5, 2.0])

@@ -29,6 +29,7 @@ import scipy
 from expdesign.conventions import plus_minus
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.values import Estimate, into_range
+from expdesign.own_units import pseudo_inverse_of
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
@@ -88,9 +89,7 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
     inside = into_range(values[:count], joint[:count, :count], ends)
     beyond = [name for name, old, (low, high) in zip(found.names, values, ends, strict=False) if not low <= old <= high]
     if beyond:
-        values = values + joint[:, :count] @ np.linalg.pinv(joint[:count, :count], hermitian=True) @ (
-            inside - values[:count]
-        )
+        values = values + joint[:, :count] @ pseudo_inverse_of(joint[:count, :count]) @ (inside - values[:count])
         warnings = (*warnings, f"Held at the end of the range that the vessel file states: {', '.join(beyond)}.")
     return replace(
         found,

@@ -18,9 +18,10 @@ import scipy
 from numpy.typing import NDArray
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain, pseudo_inverse_of, solution_of
+from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain
 from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, shows_for_certain, simulates_better
 from expdesign.foresight.information import SimulatedUnits, beside_nuisance
+from expdesign.own_units import pseudo_inverse_of, solution_of
 from expdesign.values import Array
 
 DRAWS = 2000  # of score vectors, for the probability that one cause comes before another

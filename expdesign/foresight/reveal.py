@@ -30,6 +30,7 @@ from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
 from expdesign.foresight.trial import Background, background, design_runs
 from expdesign.foresight.values import WANTED_POWER
+from expdesign.own_units import pseudo_inverse_of
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import Environment
 from expdesign.values import Array, sealed
@@ -182,9 +183,7 @@ class _Several:
         for number, item in enumerate(self.hidden):
             if item.cause == other:
                 index = self.rows[number] - len(precision)
-                cross = A[np.ix_(own, index)]
-                explained = cross @ np.linalg.pinv(A[np.ix_(index, index)], hermitian=True) @ cross.T
-                likeness.append((float(np.trace(explained)), number))
+                likeness.append((likeness_of(A, own, index), number))
         beside = self.rows[max(likeness)[1]]
         return self._wanted(place, tuple(beside.tolist()), other, (told_apart_from(WANTED_POWER), 1, 0.0))
 
@@ -208,3 +207,16 @@ class _Several:
             freedom=freedom,
             level=level,
         )
+
+
+def likeness_of(A: Array, own: Array, others: Array) -> float:
+    """How much of some effects' information others imitate: the sum of their squared canonical correlations, at most c.
+
+    Args:
+        A: (m, m) information about all.
+        own: (c,) rows of the effects.
+        others: (d,) rows of the others.
+    """
+    cross = A[np.ix_(own, others)]
+    imitated = cross @ pseudo_inverse_of(A[np.ix_(others, others)]) @ cross.T
+    return float(np.trace(pseudo_inverse_of(A[np.ix_(own, own)]) @ imitated))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from expdesign.importing.channels import LARGEST, Channel
 from expdesign.importing.sampling import SAME, Sampled
+from expdesign.own_units import covariance_of
 from expdesign.records.file import REACHED, is_input, is_turning_input
 from expdesign.values import Array
 
@@ -237,7 +238,7 @@ def _by_moves(jacobian: Array, left: Array, move: NDArray[np.signedinteger[Any]]
 
     The covariance of clusters (Liang and Zeger, 1986), as leaving each out in turn gives it (Bell and McCaffrey, 2002).
     """
-    bread = np.linalg.pinv(jacobian.T @ jacobian)
+    bread = covariance_of(jacobian.T @ jacobian)
     scores = np.array([jacobian[move == k].T @ left[move == k] for k in np.unique(move)])
     few = (len(scores) / max(len(scores) - jacobian.shape[1], 1)) ** 2
     together = few * bread @ (scores.T @ scores) @ bread

@@ -59,4 +59,3 @@ from expdesign.diagnosis.fit.linear_model import (
     window_information,
 )
 from expdesign.diagnosis.fit.output_error import AHEAD_S, fit_ahead, fit_output_error, no_smaller, with_longer_windows
-from expdesign.diagnosis.fit.own_units import covariance_of, pseudo_inverse_of, solution_of

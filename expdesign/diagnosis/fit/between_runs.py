@@ -17,8 +17,8 @@ import scipy
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.linear_model import window_information
-from expdesign.diagnosis.fit.own_units import pseudo_inverse_of
 from expdesign.estimation.solve import MOST_FREEDOM, Dispersion, Spread, few_runs_factor, spread_between_runs
+from expdesign.own_units import pseudo_inverse_of
 from expdesign.values import Array
 
 NOISE_ALONE = Dispersion()  # runs that do not differ

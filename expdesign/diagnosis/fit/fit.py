@@ -19,9 +19,9 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
-from expdesign.diagnosis.fit.own_units import solution_of
 from expdesign.diagnosis.model import FOLLOWING, LEAST_EFFECT, ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
+from expdesign.own_units import solution_of
 from expdesign.values import Array
 from expdesign.vessel.quantities import TIME, acts_on, effect_row
 

@@ -30,7 +30,6 @@ from expdesign.diagnosis.fit.linear_model import (
     sensitivities_beside,
     sensitivities_to,
 )
-from expdesign.diagnosis.fit.own_units import covariance_of
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (
     LinearisedMotion,
@@ -40,6 +39,7 @@ from expdesign.diagnosis.motion import (
     simulate_nearby,
     simulate_windows,
 )
+from expdesign.own_units import covariance_of
 from expdesign.values import Array
 
 CONVERGED_BELOW = 0.05  # a fit has converged when the next step would lower the cost by less than this

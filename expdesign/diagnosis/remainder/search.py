@@ -21,7 +21,6 @@ from expdesign.diagnosis.fit import (
     build_sensitivities,
     continuing,
     counting_runs,
-    covariance_of,
     deviations_of,
     directions_between_runs,
     effect_disturbances,
@@ -34,7 +33,6 @@ from expdesign.diagnosis.fit import (
     of_several,
     on_common_units,
     runs_of,
-    solution_of,
     tail,
     window_information,
 )
@@ -56,6 +54,7 @@ from expdesign.diagnosis.select import (
     without_step,
 )
 from expdesign.estimation.solve import Dispersion, few_runs_factor
+from expdesign.own_units import covariance_of, solution_of
 from expdesign.values import Array
 from expdesign.vessel import Term
 

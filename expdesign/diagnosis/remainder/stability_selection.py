@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.diagnosis.fit import pseudo_inverse_of, solution_of
 from expdesign.diagnosis.model import is_thrust
+from expdesign.own_units import pseudo_inverse_of, solution_of
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Term, VesselModel
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, parse_expression

@@ -16,9 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.diagnosis.fit import Fit, continuing, covariance_of, fit, marginalised, profile_cost
+from expdesign.diagnosis.fit import Fit, continuing, fit, marginalised, profile_cost
 from expdesign.diagnosis.select.selection import Selection
 from expdesign.estimation.solve import Dispersion, few_runs_factor
+from expdesign.own_units import covariance_of
 from expdesign.values import Array
 from expdesign.vessel.quantities import EFFECTS
 

@@ -34,7 +34,6 @@ from expdesign.diagnosis.fit import (
     gram_matrices,
     in_groups,
     of_several,
-    pseudo_inverse_of,
     runs_of,
     tail,
     window_information,
@@ -42,6 +41,7 @@ from expdesign.diagnosis.fit import (
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.estimation.solve import Dispersion, Spread
+from expdesign.own_units import pseudo_inverse_of
 from expdesign.values import Array
 
 DRAWS = 2000  # of the null distribution, for adjusted p-values

@@ -21,13 +21,13 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
     of_several,
     runs_of,
-    solution_of,
     tail,
 )
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
 from expdesign.diagnosis.select.score_tests import ScoreTest, scored_between_runs
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.estimation.solve import Dispersion, few_runs_factor
+from expdesign.own_units import solution_of
 
 SHAPE = ("roll:period", "roll:damping")
 """Effects that describe the kind of an oscillation, not its size."""

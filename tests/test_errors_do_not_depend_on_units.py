@@ -1,4 +1,4 @@
-"""What a diagnosis tells of a coefficient does not depend on its unit: a tanker's of r^3 is 1e9 times one of u."""
+"""What is told of a coefficient does not depend on its unit: a tanker's of r^3 is 1e9 times one of u."""
 
 import re
 from dataclasses import replace
@@ -7,16 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import expdesign.diagnosis as diagnosis
+import expdesign
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit import counting_runs, covariance_of, pseudo_inverse_of, runs_of, solution_of
+from expdesign.diagnosis.fit import counting_runs, runs_of
 from expdesign.diagnosis.fit.between_runs import _spread_of_estimates
 from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.kinks import _Profile
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.foresight.reveal import likeness_of
+from expdesign.importing.responses import _by_moves
+from expdesign.own_units import covariance_of, pseudo_inverse_of, solution_of
 from expdesign.vessel import Term
 
 UNIT = 1e-9
@@ -91,9 +94,33 @@ def test_what_data_do_not_tell_is_unsure_and_imitates_nothing(information):
     assert covariance_of(np.zeros((0, 0))).shape == (0, 0)
 
 
+@pytest.mark.parametrize("parameter", range(3))
+def test_errors_of_a_response_are_the_same_in_any_unit(parameter):
+    rng = np.random.default_rng(7)
+    jacobian, left, move = rng.standard_normal((60, 3)), rng.standard_normal(60), np.repeat(np.arange(12), 5)
+    size = np.ones(3)
+    size[parameter] = UNIT
+    plain, other = (_by_moves(one, left, move) for one in (jacobian, jacobian * size))
+    np.testing.assert_allclose(other * size, plain, rtol=1e-9)
+    assert _by_moves(jacobian * (size == 1.0), left, move)[parameter] > 1e5  # what nothing tells is unsure
+
+
+def test_effects_are_alike_in_any_unit(information):
+    A, size = information
+    own, others = np.array([0, 4]), np.array([1, 3])
+    like = likeness_of(A, own, others)
+    assert 0.0 < like < 2.0
+    assert likeness_of(A * np.outer(size, size), own, others) == pytest.approx(like, rel=1e-9)
+    A[:, 0], A[0] = A[:, 1], A[1]
+    A[0, 0] = A[0, 1] = A[1, 0] = A[1, 1]
+    assert likeness_of(A, own[:1], others) == pytest.approx(1.0)
+
+
 def test_no_matrix_of_effects_is_inverted_in_the_units_that_it_comes_in():
-    room = Path(diagnosis.__file__).parent
-    files = [path for part in ("fit", "select", "remainder") for path in sorted((room / part).glob("*.py"))]
-    assert len(files) > 15
+    root = Path(expdesign.__file__).parent
+    rooms = [root / "diagnosis" / part for part in ("fit", "select", "remainder")]
+    files = [path for room in rooms for path in sorted(room.glob("*.py"))]
+    files += [root / name for name in ("assessment/prior.py", "importing/responses.py", "foresight/reveal.py")]
+    assert len(files) > 18
     found = [path.name for path in files if re.search(r"linalg\.(pinv|lstsq|inv)\(", path.read_text("utf-8"))]
     assert found == []
