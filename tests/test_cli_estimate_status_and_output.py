@@ -19,7 +19,7 @@ from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_comma
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short noisy trial."""
-    return write_run(tmp_path_factory.mktemp("data") / "run.csv", MODEL_SHIP_TRUE, model_ship_commands(1500), **EULER)
+    return write_run(tmp_path_factory.mktemp("data") / "run.csv", MODEL_SHIP_TRUE, model_ship_commands(800), **EULER)
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,8 @@ from expdesign.cli.commands import as_json, print_summary
 from expdesign.workflows import Outcome
 from instrumented_ship import POSE, voyages, write_log, write_vessel
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 EXPORT = Path(expdesign.export.__file__).parent
 LISTS = r"\b(?:notes|warnings|remarks)\b"
 

@@ -26,6 +26,11 @@ def clean():
     return diagnose(vessel_of("tug"), hidden_record("tug", seed=3, batches=3, samples=120))
 
 
+@pytest.fixture
+def only_words(monkeypatch):
+    monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")
+
+
 def finding(keys: tuple[str, ...], cause: str = "parameters", estimates: tuple[Estimate, ...] = ()) -> Finding:
     return Finding(
         cause=cause, estimates=estimates, p_value=1e-6, fit_before=np.zeros(3), fit_after=np.ones(3),
@@ -220,6 +225,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
 
 
 @pytest.mark.parametrize(("p_value", "said"), [(0.024, False), (0.049, False), (0.25, True)])
+@pytest.mark.usefixtures("only_words")
 def test_a_cause_with_a_large_p_value_is_said_to_stay_for_another_reason(clean, p_value: float, said: bool):
     item = finding(("theta:X_u",), estimates=(Estimate(name="X_u", value=0.1, std=0.01, unit=""),))
     found = replace(
@@ -231,8 +237,8 @@ def test_a_cause_with_a_large_p_value_is_said_to_stay_for_another_reason(clean, 
     assert ("it stays because simulations of held-out data are worse without it" in page) is said
 
 
-def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
-    monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
+@pytest.mark.usefixtures("only_words")
+def test_data_too_short_for_the_residuals_are_noted(clean):
     short = replace(
         clean.residuals,
         acceleration=clean.residuals.acceleration[:5],
@@ -244,7 +250,7 @@ def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
 
 
 @pytest.mark.parametrize(("names", "words"), [(("run",), "This variable"), (("run", "heading"), "These 2 variables")])
-def test_one_variable_is_not_called_several(clean, names, words, monkeypatch):
-    monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
+@pytest.mark.usefixtures("only_words")
+def test_one_variable_is_not_called_several(clean, names, words):
     some = replace(clean.residuals, variables={name: clean.residuals.variables[name] for name in names})
     assert f"{words}</summary>" in document_html(diagnosis_document(replace(clean, residuals=some)))

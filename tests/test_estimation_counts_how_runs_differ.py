@@ -29,7 +29,7 @@ def held(found: list[Solution]) -> float:
 @pytest.mark.parametrize("solver", ["ls", "iv"])
 def test_intervals_hold_where_runs_differ(solver: str) -> None:
     """Between-run deviations of 0.4, where one run knows a parameter to 0.13: noise alone holds half of the time."""
-    trials = [trial(np.random.default_rng(seed), differ=0.4) for seed in range(150)]
+    trials = [trial(np.random.default_rng(seed), differ=0.4) for seed in range(100)]
     solve = solve_ls if solver == "ls" else lambda data: solve_iv(data, np.array(data.Phi))
     found = [solve(data) for data in trials]
     error = np.sqrt(0.95 * 0.05 / (3 * len(trials)))
@@ -43,7 +43,7 @@ def test_intervals_hold_where_runs_differ(solver: str) -> None:
 
 def test_intervals_stay_where_runs_do_not_differ() -> None:
     """At 1 % a run of trials tells of a difference in few of them, and the others have the covariance of noise."""
-    trials = [trial(np.random.default_rng(1000 + seed), differ=0.0) for seed in range(200)]
+    trials = [trial(np.random.default_rng(1000 + seed), differ=0.0) for seed in range(130)]
     found = [solve_ls(data) for data in trials]
     told = [bool(np.any(one.between_runs)) for one in found]
     assert np.mean(told) <= 0.01 + 3.0 * np.sqrt(0.01 * 0.99 / len(trials))

@@ -16,7 +16,7 @@ from expdesign.signals import Record
 from expdesign.vessel import Term
 from steered_ship import TRUTH, legs_and_runs, sailed, surge_model
 
-SEEDS, SAMPLES = 30, 2400
+SEEDS, SAMPLES = 20, 2400
 MODEL, TRUE = surge_model(), np.array(list(TRUTH.values()))
 
 

@@ -144,7 +144,8 @@ def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: 
     extra = EXTRA.get(getattr(write, "func", write))
     if extra and importlib.util.find_spec(extra) is None:
         pytest.skip(f"needs {extra}")
-    columns, said = imported(write(tmp_path / name, trip.every(5)))
+    every = 5 if "tau_psi" in inputs else 10  # rounded pulses at 1 Hz do not show where a zig-zag of 20 degrees turns
+    columns, said = imported(write(tmp_path / name, trip.every(every)))
     found = errors(columns, trip)
     assert set(bounds) | inputs <= set(found)
     assert {key: found[key] for key in bounds if found[key] > bounds[key]} == {}

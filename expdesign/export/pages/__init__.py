@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
@@ -23,6 +23,12 @@ def page_template(name: str, *, package: str = __name__) -> Template:
     It may use what all pages share: `base.html`, `parts.html` and the style sheet. A name that a template uses without
     a value is an error; text is escaped, and characters that no page may hold are replaced.
     """
+    return _environment(package).get_template(name)
+
+
+@cache
+def _environment(package: str) -> Environment:
+    """Of all templates of a package, each compiled once in a process: that takes longer than filling one in."""
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(one) for one in (package, __name__)]),
         autoescape=True,
@@ -33,7 +39,7 @@ def page_template(name: str, *, package: str = __name__) -> Template:
     )
     environment.globals["version"] = __version__
     environment.filters.update(kind=lambda block: type(block).__name__, number=id)
-    return environment.get_template(name)
+    return environment
 
 
 def _shown(value: object) -> object:
