@@ -29,7 +29,7 @@ from expdesign.monitoring import (
     watch,
 )
 from expdesign.monitoring.alarms import beside_baseline
-from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE
+from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE, _errors
 from expdesign.monitoring.force import Force
 from expdesign.monitoring.rolled import RollEvent
 from expdesign.saved import restored, saved
@@ -209,6 +209,28 @@ def test_sizes_carry_the_errors_of_the_reference(calibration: Calibration) -> No
     assert score == pytest.approx(J @ weights @ state.whole.score[0] / calibration.common)
     short = calibrate(drawn_grams(FEWEST_STRETCHES, seed=0))
     assert np.all(np.diag(beside_baseline(state.whole, short)[1]) < np.diag(information))
+
+
+@pytest.mark.parametrize("apart", [0.2, 0.4, 1.0])
+def test_errors_of_the_reference_are_right_in_what_tells_alike_changes_apart_too(apart: float) -> None:
+    """Of 400 references: what acts on both changes varies slowly, what tells them apart does not.
+
+    With a factor of each change on the covariance, squared errors of what tells them apart are 0.4 to 0.65 of it.
+    """
+    rng, acts, prior = np.random.default_rng(3), np.array([[1.5, 0.0], [1.5, 1.5 * apart]]), np.eye(2)
+    information = np.tile(acts @ acts.T, (160, 1, 1))
+    whole = information.sum(axis=0)
+    axes = np.linalg.eigh(whole)[1]
+    squares = []
+    for _ in range(400):
+        drawn, slow = rng.standard_normal((160, 2)), rng.standard_normal()
+        for row in drawn:
+            row[0] = slow = 0.5 * slow + np.sqrt(0.75) * row[0]
+        score = drawn @ acts.T
+        error = np.linalg.solve(whole + prior, score.sum(axis=0) + rng.standard_normal(2))
+        told = np.einsum("ia,ij,ja->a", axes, _errors(score, information), axes)
+        squares.append((axes.T @ error) ** 2 / told)
+    assert np.mean(squares, axis=0) == pytest.approx(1.0, abs=0.07 * 3)  # the standard error of a mean square is 0.07
 
 
 BENT = 0.1  # second-order part of the error, by which a change of three sizes acts a third more than it does when small

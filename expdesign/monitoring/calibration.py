@@ -195,7 +195,8 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
     whole = information.sum(axis=0)
     baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
     after = stretches.less(baseline)
-    inflation = _inflation(*_filtered(after, force))
+    left, told = _filtered(after, force)
+    inflation = _inflation(left, np.einsum("wii->wi", told))
     own = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     misfit, surprises = _misfits(after, force)
     weights = _weights(stretches)
@@ -206,7 +207,7 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
         ramp=ramp,
         force=force,
         baseline=baseline,
-        baseline_covariance=np.linalg.inv(whole + np.eye(m)) * np.sqrt(np.outer(inflation, inflation)),
+        baseline_covariance=_errors(left, told),
         inflation=inflation,
         rate=np.diag(whole) / inflation / len(grams),
         alike=whole / np.outer(own, own),
@@ -408,9 +409,21 @@ def _weights(stretches: Stretches) -> Array:
     return np.asarray(alike / alike.sum(axis=1, keepdims=True))
 
 
-def _inflation(score: Array, information: Array) -> Array:
-    """(m,) the largest ratio of the variance of sums over blocks to the sum of information, at least one."""
-    known = np.einsum("wii->wi", information)
+def _errors(score: Array, information: Array) -> Array:
+    """(m, m) covariance of the errors of the baseline, where the scores of neighbouring stretches correlate.
+
+    Sums of scores vary more than they say by a factor of each combination that is known apart from the others. Factors
+    of changes would not do: two that look alike, each with its own, would seem to be told apart worse than they are.
+    """
+    known, axes = np.linalg.eigh(information.sum(axis=0))
+    along = np.einsum("wij,ia,ja->wa", information, axes, axes)
+    factors = np.where(known > 1.0, _inflation(score @ axes, along), 1.0)  # what the data do not tell, the prior does
+    variance = (1.0 + known * factors) / (1.0 + known) ** 2
+    return np.asarray(axes * variance @ axes.T)
+
+
+def _inflation(score: Array, known: Array) -> Array:
+    """(m,) the largest ratio of the variance of sums over blocks to the sum of information (w, m), at least one."""
     largest = np.ones(score.shape[1])
     for count in BLOCK_COUNTS:
         edges = np.linspace(0, len(score), min(count, len(score)), endpoint=False).astype(int)

@@ -73,6 +73,7 @@ EXPECTED = {
 """Effects that name each case; a push is one of the weather, which is not the ship's."""
 WITHIN = 1.96  # standard errors that 95 % of the sizes are to be within
 STEADY_S = 120  # time without another set point from which speed counts as steady [s]
+SPANS = 6  # of ten minutes in the hour that a plain average compares with the reference
 
 
 def as_record(vessel: Vessel, table: np.ndarray) -> Record:
@@ -101,6 +102,19 @@ def steady_ratios(table: np.ndarray) -> np.ndarray:
     return np.array([(u[span] / n[span])[steady[span]].mean() for span in spans if steady[span].sum() > 60])
 
 
+def plain_average(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(k,) differences of hours of steady speeds from those of the reference, in standard errors by its spans.
+
+    Hours begin every ten minutes; there is none of less than two steady spans.
+    """
+    hours = [after[first : first + SPANS] for first in range(max(len(after) - SPANS + 1, 1))]
+    spread = before.std(ddof=1)
+    apart = [
+        (one.mean() - before.mean()) / spread / np.sqrt(1 / len(before) + 1 / len(one)) for one in hours if len(one) > 1
+    ]
+    return np.array(apart)
+
+
 def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str], *, first: int, white: bool) -> None:
     """Statements about an unchanged ship, and delays and names of changes, after 4 hours of reference."""
     with tempfile.TemporaryDirectory() as folder:
@@ -108,12 +122,13 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
     print(
         "| sea | case | voyages | alarms before | said of the reference | found | in an hour | median delay |"
         " named | or as likely | sizes in 95 % | bias, in std | left out | plain average beyond 4 std |"
+        " beyond its largest unchanged | of these not by the watch |"
     )
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for sea_name, sea in seas:
         seeds = range(trials)
         references = sailed([Ship()] * trials, 4 * HOUR, seeds=[10 * k + first for k in seeds], sea=sea)
-        known = [learnt(vessel, table, white=white) for table in references]
+        known, largest = [learnt(vessel, table, white=white) for table in references], np.nan
         for number, (case, changed) in enumerate(CASES.items()):
             if case not in cases:
                 continue
@@ -127,10 +142,14 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
             far = np.array([row["far"] for row in rows if row["far"] is not None])
             inside, bias = f"{(np.abs(far) < WITHIN).sum()} of {len(far)}", f"{far.mean():+.2f}" if len(far) else "-"
             left = 100 * np.mean([row["left"] for row in rows])
+            largest = max(abs(row["plain"]) for row in rows) if case == "unchanged" else largest
+            plain = np.abs([row["plain"] for row in rows])
+            alone = sum(one > largest and not row["hour"] for one, row in zip(plain, rows, strict=True))
             print(
                 f"| {sea_name} | {case} | {trials} | {sum(row['early'] for row in rows)} | "
                 f"{sum(row['said'] for row in rows)} | {len(found)} | {counts[0]} | {delay} | {counts[1]} | "
-                f"{counts[2]} | {inside} | {bias} | {left:.0f} % | {sum(row['plain'] for row in rows)} |",
+                f"{counts[2]} | {inside} | {bias} | {left:.0f} % | {(plain > 4).sum()} | "
+                f"{(plain > largest).sum()} of {largest:.1f} std | {alone} |",
                 flush=True,
             )
 
@@ -189,9 +208,9 @@ def sea_trial(
     late = [alarm for alarm in alarms if alarm.time_s >= HOUR]
     last = [alarm for alarm in late if alarm.time_s == late[0].time_s][-1] if late else None
     names = names_of(last, changes) if last else []
-    before, after = steady_ratios(reference), steady_ratios(table[HOUR : 2 * HOUR])
-    spread = before.std(ddof=1) * np.sqrt(1 / len(before) + 1 / max(len(after), 1))
-    plain = bool(len(after)) and abs(after.mean() - before.mean()) > 4 * spread
+    plain = plain_average(
+        steady_ratios(reference), steady_ratios(table if case == "unchanged" else table[HOUR : 2 * HOUR])
+    )
     return {
         "any": bool(alarms),
         "raised": raised > 0,
@@ -204,7 +223,7 @@ def sea_trial(
         "likely": bool(set(names) & set(EXPECTED[case])),
         "far": error_of(last, changes[last.change], case) if last and sized(last, changes, case) else None,
         "left": state.left_out_s / max(state.left_out_s + state.judged_s, 1.0),
-        "plain": plain,
+        "plain": float(np.abs(plain).max(initial=0.0)),
     }
 
 
