@@ -130,3 +130,12 @@ def test_a_stated_unit_keeps_a_channel_from_columns_of_another_kind(unit: str) -
     for use in guess(logs).uses:
         if use.column and unit not in SHARES:
             assert unit_word(unit) in FACTORS[dimension(use.column)], use
+
+
+@pytest.mark.parametrize("rows", [1, 2, 9, 10, 11, 14, 25])
+def test_the_first_rows_of_a_log_are_read_or_refused(tmp_path: Path, rows: int) -> None:
+    """Ten rows are the fewest of a run; they are shorter than what is looked at before and after an order."""
+    log = [f"{k},54.{2 * k:05d},18.5,5.0,0,0,3.0,{k % 3 * 10}" for k in range(rows)]
+    (tmp_path / "short.csv").write_text("\n".join([HEAD, *log, ""]), "utf-8")
+    status = main(["import", str(tmp_path / "short.csv"), "--length-m", "110", "--out", str(tmp_path / "runs"), "-q"])
+    assert status == (2 if rows == 1 else 3 if rows < 10 else 0)

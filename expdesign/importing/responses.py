@@ -4,8 +4,9 @@
     reached(t) + lag reached'(t) = x(t - delay) + offset
 
 which is the response of vessel files (`expdesign.vessel.Response`), fitted to the readings by least squares. An order
-that is read at even times was given some time before its reading; that of each move is found beside. Readings a second
-apart give a rate that errs by up to 1.6 times its standard error.
+that is read at even times was given some time before its reading; that of each move is found beside. Where it is the
+same for all, one clock gives the orders and reads them, and they count from their readings. Readings a second apart
+give a rate that errs by up to 1.6 times its standard error; farther than `COARSEST_S` apart, they tell the rate alone.
 """
 
 from __future__ import annotations
@@ -101,8 +102,11 @@ CERTAIN = 3.0  # standard errors from zero at which a lag or a dead time is told
 LONGEST_GAP_S = 60.0  # of positions; the time beyond it counts for nothing
 FINE_S = 0.1  # of the simulation, at most
 SHIFTS = 2  # steps in which the moment of each move is found
-NO_LAG = 0.02  # steps below which a lag is none
+NO_LAG = 0.15  # steps below which a lag is none
 EVEN = 0.9  # share of an order's intervals that are one and the same, where it is read at even times
+COARSEST_S = 1.5  # interval of orders or positions beyond which neither lag nor dead time is told
+SURE_MOVES, SURE = 8, 0.8  # moves, and how well their moments are known, that tell orders of one clock from others
+TOGETHER = 0.5  # spread of these moments, as a share of that of moments anywhere between readings, below which they are
 LESS = 0.9  # share of the root mean square that a slew rate must leave, to be told
 
 
@@ -183,18 +187,23 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
     spread_s = max(order.interval_s if even else 0.0, step_s) / math.sqrt(12.0)
     bound = (noise / spread_s) ** 2
 
-    def left(values: Array, free: tuple[str, ...]) -> Array:
+    def placed(values: Array, free: tuple[str, ...]) -> tuple[Array, Array, Array]:
+        """Errors of the readings, and of each move how early it was given [s] and what share of that they tell."""
         given = dict(zip(free, values.tolist(), strict=True))
         rate = math.exp(given["rate"]) if "rate" in given else math.inf
         at = simulated(orders[:cut], step_s, rate, given.get("lag", 0.0), given.get("delay", 0.0), begin) + offset
         change = np.gradient(at, step_s)
-        early = np.zeros(len(changes))  # of each move [s]
+        early, told = np.zeros(len(changes)), np.zeros(len(changes))
         for _ in range(SHIFTS):
             error = np.interp(read + early[own], times[:cut], at) - positions
             slope = np.interp(read + early[own], times[:cut], change)
-            down = np.bincount(own, slope * error, len(changes)) + bound * early
-            early = early - down / (np.bincount(own, slope**2, len(changes)) + bound)
-        error = np.interp(read + early[own], times[:cut], at) - positions
+            down, steep = (np.bincount(own, slope * part, len(changes)) for part in (error, slope))
+            early = early - (down + bound * early) / (steep + bound)
+            told = steep / (steep + bound)
+        return np.interp(read + early[own], times[:cut], at) - positions, early, told
+
+    def left(values: Array, free: tuple[str, ...]) -> Array:
+        error, early, _ = placed(values, free)
         return np.concatenate([error, math.sqrt(bound) * early])
 
     start = {"rate": math.log(fastest), "lag": max(step_s, 0.3), "delay": step_s}
@@ -218,12 +227,15 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
         std = dict(zip(free, _by_moves(best.jac, best.fun, moved).tolist(), strict=True))
     value = dict(zip(free, best.x.tolist(), strict=True))
     late_s = float(np.mean(times[changes] - order.time_s[stamp[changes]]))  # by the steps of the fit
-    value["delay"] += late_s + (order.interval_s / 2.0 if even else 0.0)
-    std["delay"] = math.hypot(std["delay"], spread_s / math.sqrt(moves))
+    _, early, known = placed(best.x, free)
+    one_clock = even and _go_together(early, known, spread_s)
+    value["delay"] += late_s + (order.interval_s / 2.0 if even and not one_clock else 0.0)
+    std["delay"] = math.hypot(std["delay"], spread_s / math.sqrt(moves) if one_clock is not None else spread_s)
+    fine = max(order.interval_s, reached.interval_s) <= COARSEST_S
     rate = math.exp(value["rate"]) if "rate" in value else math.inf
 
     def told(part: str) -> tuple[float, float] | None:
-        return (value[part], std[part]) if part in value and value[part] > CERTAIN * std[part] else None
+        return (value[part], std[part]) if fine and part in value and value[part] > CERTAIN * std[part] else None
 
     return Followed(
         signal=name.removesuffix("_rps").removesuffix("_rad"),
@@ -231,6 +243,18 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
         lag_s=told("lag"), delay_s=told("delay"), offset=offset, moves=moves,
         rest=float(np.sqrt(2 * best.cost / max(len(read), 1))),
     )  # fmt: skip
+
+
+def _go_together(early: Array, known: Array, spread_s: float) -> bool | None:
+    """Whether all moves were given as long before their readings; None where the readings do not tell.
+
+    Args:
+        early: (k,) how long before its reading each move was given [s].
+        known: (k,) share of that which readings tell, from 0 to 1; the rest is what is expected.
+        spread_s: standard deviation of moments anywhere between two readings [s].
+    """
+    sure = early[known > SURE]
+    return None if len(sure) < SURE_MOVES else bool(sure.std() < TOGETHER * spread_s)
 
 
 def _by_moves(jacobian: Array, left: Array, move: NDArray[np.signedinteger[Any]]) -> Array:

@@ -119,8 +119,8 @@ def _acts(stretch: Stretch, inputs: Mapping[str, Array], pause: int) -> np.ndarr
         drive = np.mean(drives, axis=0)
         size = max(float(np.abs(drives).max()), 1e-9)
         sides = np.max([_beside(own, drive, size) for own in drives], axis=0)
-        two = max(1, pause // 5)
-        later, sooner = np.r_[drive[two:], np.full(two, drive[-1])], np.r_[np.full(two, drive[0]), drive[:-two]]
+        two, rows = max(1, pause // 5), np.arange(len(drive))
+        later, sooner = drive[np.minimum(rows + two, rows[-1])], drive[np.maximum(rows - two, 0)]
         changed = np.abs(later - sooner) > DRIVE_SHARE * size
         acts |= changed | (np.abs(sides - np.quantile(sides, 0.2)) > DRIVE_SHARE * size)
         u = stretch.columns.get("u_mps")
