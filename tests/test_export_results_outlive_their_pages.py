@@ -1,13 +1,15 @@
 """Results are written before pages are drawn, and what cannot be drawn costs no more than itself."""
 
 import ast
+import errno
+import os
 from pathlib import Path
 
 import pytest
 
 import expdesign
 from expdesign import cli
-from expdesign.errors import NotDrawn
+from expdesign.errors import FileError, NotDrawn
 from expdesign.export.folder import gaps, write_files
 from expdesign.export.pages.figures import page_figure
 from synthetic_ship import sail, trial, vessel_file, write
@@ -41,10 +43,30 @@ def test_a_page_that_fails_is_replaced_by_one_that_says_so(tmp_path: Path):
 
 
 def test_an_interruption_of_the_page_leaves_results_and_no_half_page(tmp_path: Path):
+    (tmp_path / "out.html").write_text("of earlier results", encoding="utf-8")
+
     def page() -> str:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
+        write_files(tmp_path, {"out.html": page, "out.json": "{}"})
+    assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
+
+
+def test_a_disk_that_is_full_when_the_page_comes_keeps_the_results_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """An earlier page, of other results, is none of these."""
+    (tmp_path / "out.html").write_text("of earlier results", encoding="utf-8")
+
+    def page() -> str:
+        monkeypatch.setattr(os, "fsync", full)
+        return "<p>drawn</p>"
+
+    def full(file: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(FileError, match=r"out\.html cannot be written: No space left on device; out\.json are written"):
         write_files(tmp_path, {"out.html": page, "out.json": "{}"})
     assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
 

@@ -70,8 +70,9 @@ def write_files(folder: Path, files: Mapping[str, Content]) -> tuple[Path, ...]:
     """Write all results, or none; then draw the pages and write all of them, or none.
 
     Files are written beside their final names, synchronised to disk, then all renamed. After an error or an
-    interruption the folder is as it was, but for results whose pages were being drawn, and a folder made for the files
-    is gone again. A page that cannot be drawn is replaced by one that says so.
+    interruption the folder is as it was, and a folder made for the files is gone again; but for results whose pages
+    were being drawn, which stay without earlier pages, as these are of other results. A page that cannot be drawn is
+    replaced by one that says so.
 
     Args:
         folder: where to; made when missing.
@@ -90,7 +91,16 @@ def write_files(folder: Path, files: Mapping[str, Content]) -> tuple[Path, ...]:
     if results or not pages:
         _write(folder, results)
     if pages:
-        _write(folder, {name: _page(name, draw) for name, draw in pages.items()})
+        try:
+            _write(folder, {name: _page(name, draw) for name, draw in pages.items()})
+        except BaseException as error:
+            for name in pages if results else ():
+                with suppress(OSError):
+                    (folder / name).unlink(missing_ok=True)
+            if results and isinstance(error, FileError):
+                problem = f"{', '.join(pages)} {error.problem}; {', '.join(results)} are written"
+                raise FileError(folder, "", problem) from None
+            raise
     return tuple(folder / name for name in files)
 
 
