@@ -9,7 +9,7 @@ effect alone has information one; what is small there, other effects imitate.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dposv
+import scipy
 
 from expdesign.values import Array
 
@@ -41,7 +41,7 @@ def solution_of(A: Array, b: Array) -> Array:
     """x (c,) of A x = b by Cholesky's method, in own units; of a singular A the shortest one there."""
     if len(b) and (np.diag(A) > 0).all():
         size = _sizes(A)
-        root, x, failed = dposv(A / np.outer(size, size), b / size)
+        root, x, failed = scipy.linalg.lapack.dposv(A / np.outer(size, size), b / size)
         if not failed and np.diag(root).min() > LEAST_PIVOT:
             return np.asarray(x / size)
     return np.asarray(pseudo_inverse_of(A) @ b)
