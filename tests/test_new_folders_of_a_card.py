@@ -77,8 +77,8 @@ def test_a_rudder_that_goes_less_far_turns_her_as_far_as_it_goes(tmp_path: Path)
     assert circle.settings["helm_rad"] == pytest.approx(0.6 * 20 / 35, abs=1e-3)
 
 
-@pytest.mark.parametrize("name", ["Ærø", 'MS "42" \\u', "boat \N{SHIP}\x7f"])
-def test_a_ship_may_have_any_name(name: str, tmp_path: Path) -> None:
+def test_a_ship_may_have_any_name(tmp_path: Path) -> None:
+    name = 'MS "Ærø" \\u \N{SHIP}\x7f'
     card = tmp_path / "card.toml"
     text = CARDS["coaster-80m"].read_text("utf-8")
     card.write_text(re.sub(r"^name = .*", lambda _: f"name = {toml_value(name)}", text, count=1, flags=re.M), "utf-8")

@@ -10,6 +10,7 @@ import threading
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from inspect import cleandoc
 from itertools import takewhile
 from pathlib import Path
@@ -100,8 +101,7 @@ def _looks_like_file_or_value(text: str) -> bool:
 
 
 def _invoke(arguments: list[str]) -> int:
-    with interruptions_wait():  # annotations are evaluated: Python ends by the signal itself when that is broken off
-        command = with_plain_help(get_command(app))
+    command = _program()
     try:
         with command.make_context("expdesign", arguments) as context:
             command.invoke(context)
@@ -109,6 +109,13 @@ def _invoke(arguments: list[str]) -> int:
     except typer.Exit as exit_request:
         return exit_request.exit_code
     return DONE
+
+
+@cache
+def _program() -> Any:
+    """The commands as they are parsed, made once: that takes as long as many a command."""
+    with interruptions_wait():  # annotations are evaluated: Python ends by the signal itself when that is broken off
+        return with_plain_help(get_command(app))
 
 
 def with_plain_help(program: Program) -> Program:

@@ -222,7 +222,8 @@ def _is_data(row: Sequence[str]) -> bool:
     filled = [cell for cell in row if cell.strip()]
     known = sum(bool(NUMBER.fullmatch(cell)) or is_place(cell) or side_of(cell) is not None for cell in filled)
     known += sum(bool((found := WITH_UNIT.fullmatch(cell)) and unit_word(found[2]) in KNOWN) for cell in filled)
-    known += sum(bool(np.isfinite([*(own := read_stamps([cell])).day, *own.second]).any()) for cell in filled)
+    times = read_stamps(filled)
+    known += int(np.sum(np.isfinite(times.day) | np.isfinite(times.second)))
     return len(filled) > 0 and known >= max(1.0, SHARE * len(filled)) and known > 0
 
 
