@@ -71,6 +71,19 @@ def test_a_disk_that_is_full_when_the_page_comes_keeps_the_results_and_says_so(
     assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
 
 
+def test_a_page_is_never_beside_results_of_another_command(tmp_path: Path):
+    """Of two commands in one folder, the one whose results are overwritten while it draws ends as wrong."""
+
+    def meanwhile() -> str:
+        write_files(tmp_path, {"out.html": lambda: "<p>another's</p>", "out.json": '{"a": 1}'})
+        return "<p>drawn</p>"
+
+    with pytest.raises(FileError, match=r"another command wrote its results there meanwhile"):
+        write_files(tmp_path, {"out.html": meanwhile, "out.json": "{}"})
+    there = {path.name: path.read_text("utf-8") for path in tmp_path.iterdir()}
+    assert there == {"out.html": "<p>another's</p>", "out.json": '{"a": 1}'}
+
+
 def test_a_figure_that_fails_leaves_a_sentence_in_its_place():
     with pytest.warns(NotDrawn, match="the figure broken could not be drawn"):
         assert "The figure broken could not be drawn" in page_figure(broken)()

@@ -8,7 +8,7 @@ import shutil
 import traceback
 import uuid
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +82,8 @@ def write_files(folder: Path, files: Mapping[str, Content]) -> tuple[Path, ...]:
         The paths written, in the order given.
 
     Raises:
-        FileError: the folder or a file cannot be written.
+        FileError: the folder or a file cannot be written, or another command wrote the same results meanwhile, whose
+            page this is not.
     """
     results = {name: content for name, content in files.items() if not callable(content)}
     pages = {name: content for name, content in files.items() if callable(content)}
@@ -91,17 +92,34 @@ def write_files(folder: Path, files: Mapping[str, Content]) -> tuple[Path, ...]:
     if results or not pages:
         _write(folder, results)
     if pages:
-        try:
-            _write(folder, {name: _page(name, draw) for name, draw in pages.items()})
-        except BaseException as error:
-            for name in pages if results else ():
-                with suppress(OSError):
-                    (folder / name).unlink(missing_ok=True)
-            if results and isinstance(error, FileError):
-                problem = f"{', '.join(pages)} {error.problem}; {', '.join(results)} are written"
-                raise FileError(folder, "", problem) from None
-            raise
+        _write_pages(folder, pages, results)
     return tuple(folder / name for name in files)
+
+
+def _write_pages(folder: Path, pages: Mapping[str, Callable[[], str]], results: Collection[str]) -> None:
+    """Draw and write the pages of results that are written, or no page."""
+    written = _marks(folder, results)
+    try:
+        drawn = {name: _page(name, draw) for name, draw in pages.items()}
+        alone = _marks(folder, results) == written
+        if alone:
+            _write(folder, drawn)
+    except BaseException as error:
+        for name in pages if results else ():
+            with suppress(OSError):
+                (folder / name).unlink(missing_ok=True)
+        if results and isinstance(error, FileError):
+            problem = f"{', '.join(pages)} {error.problem}; {', '.join(results)} are written"
+            raise FileError(folder, "", problem) from None
+        raise
+    if not alone:
+        raise FileError(folder, "", "another command wrote its results there meanwhile, expected a folder (--out) each")
+
+
+def _marks(folder: Path, names: Collection[str]) -> list[tuple[int, int]]:
+    """What changes where a file is written again."""
+    found = [(folder / name).stat() for name in names if (folder / name).exists()]
+    return [(one.st_ino, one.st_mtime_ns) for one in found]
 
 
 def _page(name: str, draw: Callable[[], str]) -> str:
