@@ -43,7 +43,7 @@ from expdesign.progress import Progress, within
 from expdesign.signals import Record
 from expdesign.values import Array
 
-LITTLE_FIT = 50.0  # fit of an output [%] below which a simulation explains little
+LITTLE_FIT = 50.0  # fit of an output [%] below which a simulation explains little and data are not free of error
 MORE_THAN_NOISE = 2.0  # of the noise, that its error is then
 
 

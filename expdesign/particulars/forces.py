@@ -25,7 +25,8 @@ from dataclasses import dataclass
 
 from expdesign.errors import InputError
 from expdesign.particulars.card import AIR_KGPM3, WATER_KGPM3, Card, Rudder, Thruster
-from expdesign.particulars.hull import G_MPS2, Fin, Force, hull_forces, resistance
+from expdesign.particulars.hull import Fin, Force, hull_forces, resistance
+from expdesign.waves import G_MPS2
 
 EFFICIENCY = 0.6  # resistance times speed by power on the shafts
 USUAL_PITCH = 0.9  # pitch by diameter of a propeller of which only the power or the top speed is known

@@ -26,9 +26,9 @@ import numpy as np
 
 from expdesign.particulars.card import WATER_KGPM3, Hull
 from expdesign.values import Array
+from expdesign.waves import G_MPS2
 
 VISCOSITY_M2PS = 1.19e-6
-G_MPS2 = 9.81
 USUAL = {"block": (0.48, 0.88), "length by beam": (3.5, 8.5)}
 """Hulls that the regressions were made from, roughly; others have twice the scatter."""
 BEYOND = 2.0

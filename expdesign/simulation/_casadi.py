@@ -17,10 +17,9 @@ import numpy as np
 from expdesign.simulation.actuation import step_times
 from expdesign.simulation.motion import State, integrator_step, motion_rates, turns_current
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Inertia, Operators, Roll, Term, VesselModel
+from expdesign.vessel import Actuator, Inertia, Roll, Term, VesselModel
+from expdesign.vessel._casadi import CASADI, fill, for_ships
 
-SHIPS = tuple(1 << power for power in reversed(range(8)))  # number of ships in one function
-CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 LARGEST = 16_000  # largest number of instructions in one function; in longer ones a step takes as much time
 
 
@@ -112,17 +111,8 @@ class CompiledSample:
         rows, inputs, ships = delivered.shape
         drive = np.empty((ships, rows, inputs + 4))
         drive[..., :inputs], drive[..., inputs:] = delivered.transpose(2, 0, 1), sea.T[:, None]
-        begin, theta = np.ascontiguousarray(start), np.ascontiguousarray(parameters)
-        result, done = np.empty_like(begin), 0
-        for count, function in self._functions.items():
-            while done + count <= ships:
-                buffer, run = function.buffer()
-                for place, table in enumerate((begin, drive, theta)):
-                    buffer.set_arg(place, table[done:].data)
-                buffer.set_arg(3, steps_s.data)
-                buffer.set_res(0, result[done:].data)
-                run()
-                done += count
+        result = np.empty(start.shape)
+        fill(self._functions, (start, drive, parameters), (steps_s,), (result,))
         return result
 
 
@@ -160,7 +150,7 @@ def compiled_samples(structure: Structure, rows: int, substeps: int) -> dict[int
     for index in range(substeps):
         state = step(state, drive[:, index % rows], theta, steps_s[index])
     one = ca.Function("sample", [x, ca.vec(drive), theta, steps_s], [ca.cse(state)])
-    return {count: one.map(count, [False, False, False, True], [False]) for count in SHIPS}
+    return for_ships(one, own=3)
 
 
 def _chained(step: ca.Function, length: int) -> ca.Function:

@@ -1,5 +1,7 @@
 """The vessel's only use of CasADi: steps of Newton's method for commands, compiled, for many ships at a call.
 
+How functions of one ship are called for many, and the operators of terms, are here for the rooms above, too.
+
 Parameters are inputs, so models of one structure share the functions. Secants differ in one share each: what the others
 give, and what depends on the motion alone, is worked out once.
 
@@ -40,7 +42,7 @@ class CompiledSteps:
     def push(self, motion: Array, shares: Array, width: float) -> tuple[Array, Array]:
         """Accelerations (n, 3) at motions (n, 3) for shares (n, c), and what a unit of each adds (n, c, 3)."""
         found, push = np.empty(motion.shape), np.empty((*shares.shape, 3))
-        _fill(self._pushes, (motion, shares), ([width], self._parameters), (found, push))
+        fill(self._pushes, (motion, shares), ([width], self._parameters), (found, push))
         return found, push
 
     def smallest(self, push: Array, wanted: Array, near: Array) -> Array:
@@ -53,7 +55,7 @@ class CompiledSteps:
         for _ in range(shares.shape[1]):
             moved, left = np.empty((len(open_), shares.shape[1])), np.empty((len(open_), shares.shape[1]))
             over = np.empty(len(open_))
-            _fill(self._shares, (push[open_], wanted[open_], shares[open_], free[open_]), (), (moved, left, over))
+            fill(self._shares, (push[open_], wanted[open_], shares[open_], free[open_]), (), (moved, left, over))
             shares[open_], free[open_] = moved, left
             open_ = open_[over > 0]
             if not len(open_):
@@ -61,7 +63,7 @@ class CompiledSteps:
         return shares
 
 
-def _fill(functions: dict[int, Any], rows: Sequence[Array], shared: Sequence[Any], results: Sequence[Array]) -> None:
+def fill(functions: dict[int, Any], rows: Sequence[Array], shared: Sequence[Any], results: Sequence[Array]) -> None:
     """Write results (n, ...) of functions of so many ships each, for rows (n, ...) of every ship and what all share."""
     given = [np.ascontiguousarray(table, dtype=float) for table in rows]
     same, done = [np.array(table, dtype=float) for table in shared], 0
@@ -125,10 +127,10 @@ def _functions(
         [motion, tried, width, theta],
         ca.cse([accelerations(tried), ca.densify(ca.horzcat(*secants) / (2.0 * width))]),
     )
-    return _for_ships(pushes, own=2), _for_ships(_redistributed(places, low, high), own=4)
+    return for_ships(pushes, own=2), for_ships(_redistributed(places, low, high), own=4)
 
 
-def _for_ships(one: ca.Function, *, own: int) -> dict[int, Any]:
+def for_ships(one: ca.Function, *, own: int) -> dict[int, Any]:
     """The function for several ships: the first arguments are each ship's own, the others all share."""
     alike = [place >= own for place in range(one.n_in())]
     return {count: one.map(count, alike, [False] * one.n_out()) for count in SHIPS}

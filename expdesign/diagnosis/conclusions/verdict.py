@@ -17,6 +17,7 @@ from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, SENSOR_CAUSES
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
+from expdesign.diagnosis.judgement import LITTLE_FIT
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
 from expdesign.values import Array
@@ -37,7 +38,6 @@ MANOEUVRES = {
 }
 """Standard proposals in words; those of a scenario's dictionary keep their names."""
 
-LITTLE_FIT = 50.0  # fit [%] of an output below which data are not called free of error, whatever noise there is
 MOST_SIZES = 2  # numbers of a cause in a sentence; the table has all
 MOST_NAMED = 3  # parameters, or equivalent causes, in a sentence
 SENSORS = tuple(cause.name for cause in SENSOR_CAUSES)

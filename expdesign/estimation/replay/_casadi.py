@@ -19,10 +19,10 @@ from expdesign.simulation import motion_rates
 from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
-from expdesign.vessel import Operators, VesselModel
+from expdesign.vessel import VesselModel
+from expdesign.vessel._casadi import CASADI
 
 BLOCK_INSTRUCTIONS = 20_000  # size of the flat CasADi functions that simulations are cut into
-CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 
 
 def batch_simulator(

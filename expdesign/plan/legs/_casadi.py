@@ -26,7 +26,8 @@ from expdesign.plan.legs.problem import LegProblem
 from expdesign.simulation import Environment, SampleMap, motion_rates, rk4_step, sample_map, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
-from expdesign.vessel import Operators, Vessel, by_force
+from expdesign.vessel import Vessel, by_force
+from expdesign.vessel._casadi import CASADI
 
 SMOOTHNESS = 0.02  # weight of squared command steps against time in units of `LegProblem.time_scale_s`
 SMALLNESS = 1e-4  # weight of squared commands: decides between commands that give the same force
@@ -42,7 +43,6 @@ PROGRAMS = 24  # nonlinear programs kept built
 
 IDLE_SHARE = 1e-9  # of a scale, below which a command of an answer is none: interior points end beside nothing
 
-CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 RELAXED = 1e-8
 """IPOPT may exceed bounds by this (its `bound_relax_factor`); rates of actuators keep as much away from theirs."""
 
