@@ -88,6 +88,21 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "expected gpx 1.1" in capsys.readouterr().err
 
 
+def test_all_problems_of_a_route_are_told_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, content in export_case.plan_files().items():
+        (tmp_path / name).write_text(content)
+    assert main(["export", str(tmp_path / "plan.json"), "--format", "rtz", "--quiet"]) == 0
+    text = (tmp_path / "route.rtz").read_text()
+    wrong = re.sub(r'lat="-?[\d.]+"', 'lat="91"', text, count=3)
+    (tmp_path / "route.rtz").write_text(wrong.replace('routeName="route"', 'routeName="other"'))
+    assert main(["check-route", str(tmp_path / "route.rtz"), "--quiet"]) == 2
+    *notes, line = capsys.readouterr().err.splitlines()
+    assert line.endswith("lat = '91', expected -90 to 90 (and 3 more)")
+    assert [note.split("route.rtz: ")[1].split(",")[0] for note in notes] == [
+        "position has lat = '91'", "position has lat = '91'", "routeName is 'other'"
+    ]  # fmt: skip
+
+
 def test_export_writes_every_format_from_the_plan_files_with_times_where_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -73,15 +73,21 @@ def check_routes(request: requests.CheckRoute, *, progress: Progress = silent) -
     """Whether RTZ and GPX files are fit to be loaded.
 
     Raises:
-        FileError: the first problem of the first file that has one, and how many more there are.
+        FileError: the first problem of the first file that has one, and how many more there are, in its notes.
     """
     for number, path in enumerate(request.files):
         progress(f"checking {path.name}", number / len(request.files))
         problems = check_route_file(path)
         if problems:
             more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-            raise FileError(path, "", problems[0] + more)
+            first = FileError(path, "", problems[0] + more)
+            for problem in problems[1 : MOST_NOTES + 1]:
+                first.add_note(f"{path}: {problem}")
+            raise first
     return Outcome(files=(), document=Document(facts={"files": len(request.files), "problems": 0}))
+
+
+MOST_NOTES = 20  # further problems of a file that are told, each in a line
 
 
 Estimates = RootModel[dict[str, Estimated]]
