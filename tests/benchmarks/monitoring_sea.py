@@ -3,8 +3,9 @@
 ``python tests/benchmarks/monitoring_sea.py [--trials N]``: a ship sails N voyages in each of several cases, on
 autopilot in a slight sea, beside a plain average of her steady speeds. ``--calm`` the same without waves; ``--seas``
 and ``--cases`` those alone, of more seas than these; ``--white`` with no model of the noise within stretches;
-``--seed`` with other numbers than those that constants were chosen on; ``--winds`` an unchanged ship in winds that
-nobody measures, after a reference in a fresh one; with ``--measured`` a vane on board measures them.
+``--seed`` with other numbers than those that constants were chosen on; ``--plain`` the plain average alone, which the
+same voyages and a day of each unchanged ship show at equal rates of false alarms; ``--winds`` an unchanged ship in
+winds that nobody measures, after a reference in a fresh one; with ``--measured`` a vane on board measures them.
 """
 
 from __future__ import annotations
@@ -154,6 +155,29 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
             )
 
 
+def plain_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str], *, first: int) -> None:
+    """The plain average in the hour after a change, at the limit that a day of each unchanged ship does not pass."""
+    print("| sea | case | voyages | beyond 4 std | beyond the largest of a day of each | in each voyage |")
+    print("|---|---|---|---|---|---|")
+    for name, sea in seas:
+        seeds = np.arange(trials) * 10 + first
+        references = [steady_ratios(one) for one in sailed([Ship()] * trials, 4 * HOUR, seeds=seeds.tolist(), sea=sea)]
+        days = sailed([Ship()] * trials, DAY, seeds=(seeds + 9).tolist(), sea=sea)
+        largest = [np.abs(plain_average(*pair)) for pair in zip(references, map(steady_ratios, days), strict=True)]
+        limit = max(one.max() for one in largest)
+        false = sum(int((np.diff(one > 4, prepend=False) & (one > 4)).sum()) for one in largest)
+        print(f"| {name} | unchanged | {trials} | {false} times in {24 * trials} h | {limit:.2f} | |", flush=True)
+        for number, (case, changed) in enumerate(CASES.items()):
+            if case not in cases or case == "unchanged":
+                continue
+            own = (seeds + 1 + number).tolist()
+            tables = sailed([changed] * trials, 3 * HOUR, seeds=own, sea=sea, since_s=HOUR)
+            after = [steady_ratios(table[HOUR : 2 * HOUR]) for table in tables]
+            far = [np.abs(plain_average(*pair)).max(initial=0.0) for pair in zip(references, after, strict=True)]
+            told = ", ".join(f"{one:.1f}" for one in far)
+            print(f"| {name} | {case} | {trials} | {sum(z > 4 for z in far)} | {sum(z > limit for z in far)} | {told} |")
+
+
 def learnt(vessel: Vessel, table: np.ndarray, *, white: bool = False) -> tuple[Any, ...]:
     """Changes that are watched for, the noise and the calibration of a reference."""
     record = as_record(vessel, table)
@@ -261,6 +285,7 @@ if __name__ == "__main__":
     parser.add_argument("--seas", nargs="+", choices=every)
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--seed", type=int, default=5000, help="the first")
+    parser.add_argument("--plain", action="store_true", help="the plain average of steady speeds alone")
     parser.add_argument("--winds", action="store_true", help="an unchanged ship in winds")
     parser.add_argument("--measured", action="store_true", help="which a vane on board measures")
     asked = parser.parse_args()
@@ -268,4 +293,8 @@ if __name__ == "__main__":
         wind_study(asked.trials, first=asked.seed, measured=asked.measured)
         sys.exit()
     names = asked.seas or (["calm"] if asked.calm else [name for name, _ in SEAS])
-    sea_study(asked.trials, [(name, every[name]) for name in names], asked.cases, first=asked.seed, white=asked.white)
+    seas = [(name, every[name]) for name in names]
+    if asked.plain:
+        plain_study(asked.trials, seas, asked.cases, first=asked.seed)
+    else:
+        sea_study(asked.trials, seas, asked.cases, first=asked.seed, white=asked.white)
