@@ -175,7 +175,8 @@ def plain_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[st
             after = [steady_ratios(table[HOUR : 2 * HOUR]) for table in tables]
             far = [np.abs(plain_average(*pair)).max(initial=0.0) for pair in zip(references, after, strict=True)]
             told = ", ".join(f"{one:.1f}" for one in far)
-            print(f"| {name} | {case} | {trials} | {sum(z > 4 for z in far)} | {sum(z > limit for z in far)} | {told} |")
+            beyond = [sum(one > most for one in far) for most in (4.0, limit)]
+            print(f"| {name} | {case} | {trials} | {beyond[0]} | {beyond[1]} | {told} |", flush=True)
 
 
 def learnt(vessel: Vessel, table: np.ndarray, *, white: bool = False) -> tuple[Any, ...]:
