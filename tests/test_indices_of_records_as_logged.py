@@ -5,6 +5,7 @@ The truth is a 50 m ship with a rudder of 0.05 rad/s, simulated here by itself i
 
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -18,7 +19,17 @@ from expdesign.cli import main
 from expdesign.export.indices_form import IndicesContent
 from expdesign.export.indices_page import indices_document
 from expdesign.export.pages import document_html
-from expdesign.indices import Circle, NotStandard, Stop, ZigZag, criteria, judge, measured_trial, standard_results
+from expdesign.indices import (
+    Circle,
+    NotStandard,
+    Stop,
+    ZigZag,
+    criteria,
+    judge,
+    measured_trial,
+    standard_results,
+    with_drift_of_circles,
+)
 from expdesign.indices.criteria import Verdict
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
@@ -238,6 +249,21 @@ def test_a_current_that_a_circle_is_too_short_to_show_is_told_with_what_it_does(
             assert abs(one - other) < 1.05 * shift
     if still.tactical_diameter_m is not None and moving.tactical_diameter_m is not None:
         assert abs(still.tactical_diameter_m - moving.tactical_diameter_m) > 0.3 * shift
+
+
+def test_zigzags_in_the_current_of_a_circle_are_told_to_be_over_ground() -> None:
+    """Speed over ground decides their limits, and initial turning is counted over ground."""
+    batches = [record(sailed(TEN, TEN)[0], 0.5), record(sailed(FULL, math.inf, seconds=260.0)[0], 0.5)]
+    flow = (0.3, -0.4)
+    still = with_drift_of_circles([measured_trial(SHIP, batch) for batch in batches])
+    moving = with_drift_of_circles([measured_trial(SHIP, in_current(batch, *flow)) for batch in batches])
+    zigzag, circle = moving
+    assert not [remark for one in (*still, circle) for remark in one.remarks if "over ground" in remark]
+    (told,) = [remark for remark in zigzag.remarks if "over ground" in remark]
+    drift = float(re.search(r"drift by ([\d.]+) m/s", told)[1])
+    assert drift == pytest.approx(math.hypot(*flow), abs=0.02)
+    assert abs(zigzag.speed_mps - still[0].speed_mps) == pytest.approx(0.3, abs=0.02)  # it sails north
+    assert zigzag.overshoots_rad == pytest.approx(still[0].overshoots_rad)
 
 
 def test_helm_let_go_ends_a_trial_and_a_second_trial_is_refused() -> None:

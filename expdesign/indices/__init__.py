@@ -20,6 +20,6 @@ from expdesign.indices.criteria import (
     criteria,
     judge,
 )
-from expdesign.indices.measured import NotStandard, measured_trial
+from expdesign.indices.measured import NotStandard, measured_trial, with_drift_of_circles
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcome_gradients, outcomes, standard_results
 from expdesign.indices.read import steered_run

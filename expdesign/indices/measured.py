@@ -8,6 +8,7 @@ begins at the sample that first shows it; where a logger reads the rudder, it be
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -276,6 +277,28 @@ def _removed(circle: Circle, half_turn_s: float) -> tuple[str, ...]:
     if flow <= CURRENT * (circle.speed_mps or math.inf):
         return ()
     return (f"a drift of {flow:.2g} m/s is taken for a uniform current and removed",)
+
+
+def with_drift_of_circles(seen: Sequence[Found]) -> tuple[Found, ...]:
+    """Runs measured together, with a remark on all that are over ground where circles show a current."""
+    drifts = [
+        math.hypot(one.current_north_mps or 0.0, one.current_east_mps or 0.0)
+        for one in seen
+        if isinstance(one, Circle) and one.current_north_mps is not None
+    ]
+    drift_mps = float(np.median(drifts)) if drifts else 0.0
+
+    def told(one: Found) -> Found:
+        if isinstance(one, (Circle, NotStandard)) or drift_mps <= CURRENT * (one.speed_mps or math.inf):
+            return one
+        what = "speed, initial turning, and limits by L/V" if isinstance(one, ZigZag) else "speed and distances"
+        remark = (
+            f"{what} are over ground: circles of these data drift by {drift_mps:.2g} m/s, which is not taken out, "
+            f"{100.0 * drift_mps / (one.speed_mps or math.inf):.0f} % of the approach speed"
+        )
+        return replace(one, remarks=(*one.remarks, remark))
+
+    return tuple(told(one) for one in seen)
 
 
 def _late(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:

@@ -9,7 +9,7 @@ from expdesign import requests
 from expdesign.errors import InputError, NoAnswer
 from expdesign.export.indices_form import IndicesContent, indices_json
 from expdesign.export.indices_page import indices_document
-from expdesign.indices import StandardResults, measured_trial, standard_results
+from expdesign.indices import StandardResults, measured_trial, standard_results, with_drift_of_circles
 from expdesign.indices.measured import Found
 from expdesign.particulars import Expected, expected, standard_trials
 from expdesign.progress import Progress, silent
@@ -77,7 +77,7 @@ def _measured(
         seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
         doubts += record.doubts
         notes += (note for note in record.notes if note not in (*record.doubts, *record.idle))
-    return tuple(seen), (*doubts, *notes)
+    return with_drift_of_circles(seen), (*doubts, *notes)
 
 
 def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[StandardResults | None, str]:
