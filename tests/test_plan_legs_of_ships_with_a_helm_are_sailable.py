@@ -62,9 +62,9 @@ def sailed(ship: str, case: str):
 BOTH = pytest.mark.parametrize(
     ("ship", "case"),
     [
-        ("coaster", "to rest"),
+        ("coaster", "after a turn"),
         ("coaster", "far"),
-        pytest.param("coaster", "after a turn", marks=pytest.mark.slow),
+        pytest.param("coaster", "to rest", marks=pytest.mark.thorough),
         pytest.param("coaster", "off from rest", marks=pytest.mark.slow),
         pytest.param("catamaran", "after a turn", marks=pytest.mark.slow),
         pytest.param("catamaran", "far", marks=pytest.mark.slow),
