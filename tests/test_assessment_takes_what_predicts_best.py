@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess
-from expdesign.assessment.ahead import Ahead, by_run
+from expdesign.assessment.ahead import TRIAL_LENGTHS, Ahead, by_run, missed
 from expdesign.assessment.held_out import (
     Candidate,
     Found,
@@ -29,7 +29,7 @@ from expdesign.records import load_records
 from expdesign.reduction import averaged, samples_of_a_mean
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
-from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Limit, Missed, Sensors, Term, Vessel, VesselModel
 from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_commands, quiet, write_run
 from sample_files import outside
 
@@ -123,6 +123,42 @@ def test_predictions_are_those_of_the_closed_form() -> None:
                 x = np.exp(a) * x + (np.exp(a) - 1) / a * GAIN * d[k]
                 errors.append(x - r[k + 1])
         assert own == pytest.approx(np.sqrt(np.mean(np.square(errors))) / r.std(), rel=1e-4)
+
+
+def test_what_a_model_misses_is_the_share_of_its_wrong_gain() -> None:
+    """Steady turns: from the measured rate r to 1.2 r as 1 - exp(a t); speeds that decay twice as fast as they should.
+
+    Over six lengths each the way missed and the heading missed are sums of these, of all windows together.
+    """
+    gain, decay, step_s, length_m = 0.02, -0.5, 0.1, 5.0
+    terms = (Term("u", "X_u", "u"), Term("r", "N_r", "r"), Term("r", "N_d", "rudder1"))
+    true = replace(yaw_ship().model, terms=terms, parameters=[-0.01, decay, gain], parameter_std=np.zeros(3))
+    wrong = true.with_parameters({"X_u": -0.02, "N_d": 1.2 * gain})
+    time = step_s * np.arange(901)
+    surge = np.exp(-0.01 * time)
+    batches = [
+        Batch(
+            name=f"turn {angle}", sample_time_s=step_s, input_names=("rudder1",), inputs=np.full((901, 1), angle),
+            velocity=np.column_stack([surge, 0 * time, np.full(901, -gain / decay * angle)]),
+        )
+        for angle in (0.2, -0.4)
+    ]  # fmt: skip
+    found = missed([wrong, wrong], batches, length_m=length_m, wind=False, integration=RK4)
+    assert found is not None
+    last_s = TRIAL_LENGTHS * length_m / float(np.sqrt(np.mean(surge**2)))
+    count = round(last_s / step_s) + 1
+    inside = step_s * np.arange(count)
+    firsts = range(0, 901 - count + 1, count - 1)
+    ways = [surge[first : first + count].sum() for first in firsts]
+    fewer = [np.sum(surge[first] * (np.exp(-0.02 * inside) - np.exp(-0.01 * inside))) for first in firsts]
+    assert found.way_share == pytest.approx(np.linalg.norm(fewer) / np.linalg.norm(ways), rel=1e-3)
+    assert found.turn_share == pytest.approx(0.2 * np.mean(1 - np.exp(decay * inside)), rel=1e-3)
+    mad = true.with_parameters({"X_u": 40.0, "N_r": 40.0})
+    with np.errstate(all="ignore"):
+        assert missed([mad, None], batches, length_m=length_m, wind=False, integration=RK4) == Missed(
+            way_share=1.0, turn_share=1.0
+        )
+    assert missed([None, None], batches, length_m=length_m, wind=False, integration=RK4) is None
 
 
 @pytest.mark.parametrize("runs", [1, 2, 3, 4, 11])

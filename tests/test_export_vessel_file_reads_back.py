@@ -9,7 +9,7 @@ import pytest
 from expdesign.errors import FileError, InputError
 from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
-from expdesign.vessel import Vessel
+from expdesign.vessel import Missed, Vessel
 from scenario_files import SCENARIOS
 from vessel_files import KVLCC2, write_vessel
 
@@ -68,6 +68,13 @@ def test_numbers_and_names_of_any_kind_come_back(tmp_path: Path) -> None:
     model = replace(vessel.model, parameters=values, parameter_std=np.abs(values))
     odd = replace(vessel, name='Ship "Å" \\ No. 1 = # [x]', model=model)
     assert same(odd, read_back(odd, tmp_path, comments=("first", "second\nthird")))
+
+
+def test_what_the_data_told_of_the_model_comes_back(tmp_path: Path) -> None:
+    vessel = load_vessel(FILES[0])
+    told = replace(vessel.model, speeds_mps=(-0.5, 6.25), missed=Missed(way_share=0.0125, turn_share=0.5))
+    found = read_back(replace(vessel, model=told), tmp_path).model
+    assert (found.speeds_mps, found.missed) == (told.speeds_mps, told.missed)
 
 
 def test_comments_go_first(tmp_path: Path) -> None:

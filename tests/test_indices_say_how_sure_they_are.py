@@ -12,11 +12,11 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.export.files import vessel_toml
-from expdesign.particulars import SCATTER, expected, standard_trials
+from expdesign.particulars import SCATTER, Expected, expected, standard_trials
 from expdesign.particulars.intervals import DRAWS
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_vessel
-from expdesign.vessel import Vessel
+from expdesign.vessel import Missed, Vessel
 from scenario_files import SCENARIOS
 
 VESSELS = SCENARIOS / "vessels"
@@ -31,14 +31,29 @@ def uncertain(share: float) -> Vessel:
     return replace(COASTER, model=known)
 
 
-def test_of_a_ship_that_is_known_trials_scatter_alone() -> None:
-    """Ends are quantiles of normal logarithms, each within four of its standard errors."""
+def scatter_of(one: Expected, missed: Missed | None) -> float:
+    """Standard deviation of a trial's result beside what parameters explain: of overshoots themselves, else of logs."""
+    if missed is None or one.quantity in ("reach_m", "time_s"):
+        return SCATTER[one.quantity]
+    if one.quantity.startswith("overshoot"):
+        return missed.turn_share * (one.trial.angle_rad + one.value)
+    if one.quantity.startswith("speed"):
+        return missed.way_share
+    return missed.turn_share if one.quantity.startswith("time") else math.hypot(missed.way_share, missed.turn_share)
+
+
+@pytest.mark.parametrize("missed", [None, Missed(way_share=0.02, turn_share=0.03)])
+def test_of_a_ship_that_is_known_trials_scatter_alone(missed: Missed | None) -> None:
+    """Ends are quantiles of normal logarithms or angles, each within four of its standard errors."""
     quantile, share = 1.96, 0.025
     density = math.exp(-(quantile**2) / 2) / math.sqrt(2 * math.pi)
     error = math.sqrt(share * (1 - share) / DRAWS) / density  # of a quantile, in standard deviations
-    for one in expected(uncertain(1e-9), standard_trials(SPEED, stops=True)):
+    ship = uncertain(1e-9)
+    ship = replace(ship, model=replace(ship.model, missed=missed))
+    for one in expected(ship, standard_trials(SPEED, stops=True)):
+        by_angle = missed is not None and one.quantity.startswith("overshoot")
         for end, side in ((one.low, -1.0), (one.high, 1.0)):
-            apart = math.log(end / one.value) / SCATTER[one.quantity]
+            apart = (end - one.value if by_angle else math.log(end / one.value)) / scatter_of(one, missed)
             assert abs(apart - side * quantile) < 4 * error, one.quantity
 
 

@@ -132,6 +132,8 @@ def test_what_follows_a_trial_works_with_terms_that_read_actuators(
     assert (np.abs(found.parameters - true.parameters) < 5 * found.parameter_std).all()
     assert found.speeds_mps is not None
     assert found.speeds_mps[1] > found.speeds_mps[0]
+    assert found.missed is not None  # her own structure, so that unseen runs are missed by what noise does
+    assert 0.0 < found.missed.turn_share < 0.05
 
 
 def test_ships_differ_in_what_nobody_stated_and_the_file_can_say_that_they_do_not(tmp_path: Path) -> None:

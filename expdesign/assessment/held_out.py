@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from expdesign.assessment.ahead import LARGEST_ERROR, Ahead, by_run, typical
+from expdesign.assessment.ahead import LARGEST_ERROR, Ahead, by_run, missed, typical
 from expdesign.assessment.misfit import AHEAD_S
 from expdesign.conventions import rotated
 from expdesign.errors import Diverged, InputError, NoAnswer
@@ -41,7 +41,7 @@ from expdesign.estimation.regression import model_for
 from expdesign.estimation.replay import Integration, build_replay
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, sealed
-from expdesign.vessel import Limit, Vessel, VesselModel
+from expdesign.vessel import Limit, Missed, Vessel, VesselModel
 
 SAME_ERROR = 0.02  # share of an error below which a difference of two does not count
 FAR_WORSE = 2.0  # times the least error, from which on one is worse for certain however few runs there are
@@ -69,6 +69,7 @@ class HeldOut:
     explains: bool = True
     # (runs,) means over outputs of the logarithms of each run's errors, the same runs of all methods; or not known
     of_runs: Array | None = None
+    missed: Missed | None = None  # what predictions as long as a standard trial miss
 
     @property
     def label(self) -> str:
@@ -259,15 +260,24 @@ def held_out(
     bounded = stay_bounded(structures, ship, seen_as(record).batches, integration)
     still: dict[bool, Ahead] = {}
 
+    def in_water(item: Candidate, found: Sequence[Found | None]) -> list[Batch]:
+        if not item.method.weather.steady:
+            return apart
+        return [_through_water(batch, own) for batch, own in zip(apart, found, strict=True)]
+
     def shares_of(item: Candidate, found: Sequence[Found | None]) -> Array:
         if item.method.weather.steady:
-            moved = [_through_water(batch, own) for batch, own in zip(apart, found, strict=True)]
+            moved = in_water(item, found)
             ahead = Ahead(structures[0], moved, wind=item.wind, integration=integration, spread=apart)
         else:
             if item.wind not in still:
                 still[item.wind] = Ahead(structures[0], apart, wind=item.wind, integration=integration)
             ahead = still[item.wind]
-        return ahead.shares([None if own is None else own.model for own in found])
+        return ahead.shares(_models(found))
+
+    def missed_by(item: Candidate, found: Sequence[Found | None]) -> Missed | None:
+        moved = in_water(item, found)
+        return missed(_models(found), moved, length_m=ship.length_m, wind=item.wind, integration=integration)
 
     each = [shares_of(item, [row[number] for row in models]) for number, item in enumerate(candidates)]
     own_data = [
@@ -285,9 +295,14 @@ def held_out(
             bounded=own,
             explains=_joined(typical(seen)) <= FAR_WORSE * _joined(typical(shares)),
             of_runs=by_run(shares, names),
+            missed=missed_by(candidate, [row[number] for row in models]) if unseen else None,
         )
-        for candidate, shares, seen, own in zip(candidates, each, own_data, bounded, strict=True)
+        for number, (candidate, shares, seen, own) in enumerate(zip(candidates, each, own_data, bounded, strict=True))
     )
+
+
+def _models(found: Sequence[Found | None]) -> list[VesselModel | None]:
+    return [None if own is None else own.model for own in found]
 
 
 def _through_water(batch: Batch, found: Found | None) -> Batch:

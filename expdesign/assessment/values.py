@@ -20,7 +20,7 @@ from expdesign.estimation.solve import BLOCKS
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.vessel import VesselModel
+from expdesign.vessel import Missed, VesselModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,6 +89,11 @@ class Assessment:
     def left_out(self) -> tuple[str, ...]:
         """One sentence for each method that gave no estimate, or was not tried."""
         return (*(f"No estimate by {label}: {error}." for label, error in self.failures), *self.notes)
+
+    @property
+    def missed(self) -> Missed | None:
+        """What the chosen method misses of runs that it has not seen, where that was looked at."""
+        return next((item.missed for item in self.compared if item.label == self.best.label), None)
 
     @property
     def why(self) -> str:

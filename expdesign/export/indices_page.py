@@ -34,6 +34,7 @@ from expdesign.indices import (
     beaufort,
 )
 from expdesign.particulars import shown as in_mariners_units
+from expdesign.vessel import Vessel
 
 # The reporting form: ship, conditions, and results to port and to starboard beside the criterion.
 #
@@ -78,11 +79,17 @@ STOPS = (
     "From", "Run", "Approach", "Track reach", "Head reach", "To starboard", "Change of heading [°]", "Time [s]",
 )  # fmt: skip
 SURE = ("Simulated run", "Result", "Simulated", "95 % from", "To")
-SURENESS = (
-    "Of 100 trials of ships that the vessel file's standard deviations allow, 95 lie within. Repeated trials scatter, "
-    "and a model of second order misses them: 6 % of an advance or tactical diameter and a fifth of an overshoot count "
-    "as standard deviations. \u201cNo end\u201d: some of these ships do not come to the end of the trial."
+SURENESS = "Of 100 trials of ships that the vessel file's standard deviations allow, 95 lie within."
+ASSUMED = (
+    "Repeated trials scatter, and a model of second order misses them. The file does not say by how much, as estimate "
+    "writes it (model.missed): 6 % of an advance or tactical diameter and a fifth of an overshoot count as standard "
+    "deviations."
 )
+MISSED = (
+    "Repeated trials scatter, and the model misses them: predictions of runs that were left out in turn, by {way:.2g} "
+    "% of the way sailed and {turn:.2g} % of the heading turned (model.missed), which count as standard deviations."
+)
+ENDLESS = "\u201cNo end\u201d: some of these ships do not come to the end of the trial."
 DEFINITIONS = (
     "Advance, transfer and tactical diameter refer to the midship point. They are measured from the rudder order, "
     "along and across the approach heading.",
@@ -134,7 +141,9 @@ def indices_document(content: IndicesContent) -> Document:
             section("Zig-zags", Table(header=ZIGZAGS, rows=zigzags, texts=6)),
             section("Stopping", Table(header=STOPS, rows=stops, texts=3, on="page")),
             section(
-                "How sure the simulated results are", Table(header=SURE, rows=sure_rows(content), texts=2), SURENESS
+                "How sure the simulated results are",
+                Table(header=SURE, rows=sure_rows(content), texts=2),
+                _sureness(content.vessel),
             ),
             *(
                 [section("Missing results and remarks", *notes_of(content.notes_in_words))]
@@ -144,6 +153,13 @@ def indices_document(content: IndicesContent) -> Document:
             section("Definitions", Items(DEFINITIONS)),
         ),
     )
+
+
+def _sureness(vessel: Vessel) -> str:
+    """What intervals count, in words."""
+    missed = vessel.model.missed
+    trials = ASSUMED if missed is None else MISSED.format(way=100 * missed.way_share, turn=100 * missed.turn_share)
+    return f"{SURENESS} {trials} {ENDLESS}"
 
 
 def sure_rows(content: IndicesContent) -> list[tuple[str, ...]]:

@@ -282,7 +282,8 @@ def _predicted(
     """Of the ship from particulars alone, the fitted one, then drawn ones; a trial without end counts as endless."""
     for quantity, values in fleet.results(trial).items():
         before, value, *drawn = np.nan_to_num(values, nan=math.inf).tolist()
-        low, high = interval(value, np.array(drawn), problem.scatter_of(quantity), rng)
+        scatter = problem.scatter_of(quantity) * rng.standard_normal(len(drawn))
+        low, high = interval(value, np.array(drawn) * np.exp(scatter))
         yield Predicted(
             trial=trial, quantity=quantity, value=value, low=low, high=high, prior=before,
             stated=tuple(one for one in stated if one.trial == trial and one.quantity == quantity),

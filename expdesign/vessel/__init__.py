@@ -22,7 +22,7 @@ from expdesign.vessel.inverse import (
     required_push,
     within_limits,
 )
-from expdesign.vessel.model import LEAST_KEPT, NOT_SUPPORTED, UNSTATED_SHARE, Inertia, VesselModel
+from expdesign.vessel.model import LEAST_KEPT, NOT_SUPPORTED, UNSTATED_SHARE, Inertia, Missed, VesselModel
 from expdesign.vessel.quantities import EXACT, SENSORS, Response, Sensors
 from expdesign.vessel.roll import NOMINAL, NOT_ACTING_BACK, ROLL_PARAMETERS, Body, Load, Roll, RollPendulum
 from expdesign.vessel.structures import NUMPY, SCALAR, STRUCTURES, TERMS, Operators, Term, structure_terms

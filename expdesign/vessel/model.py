@@ -103,6 +103,14 @@ FAR_OUTSIDE = 3.0  # standard deviations outside of its range from which on a pa
 LEAST_KEPT = 1e-3  # share of drawn vessels within the stated range below which the range contradicts the prior
 
 
+@dataclass(frozen=True, kw_only=True)
+class Missed:
+    """By how much predictions as long as a standard trial miss runs that they have not seen, standard deviations."""
+
+    way_share: float  # of the way sailed ahead
+    turn_share: float  # of the heading turned
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VesselModel:
     """Model structure with parameter values."""
@@ -125,6 +133,7 @@ class VesselModel:
     unstated_std: Mapping[str, float] = field(default_factory=dict)
     # least and most surge speed of the data that determined the parameters, where known
     speeds_mps: tuple[float, float] | None = None
+    missed: Missed | None = None  # what the same method missed of runs of these data that it had not seen, where known
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -251,7 +251,7 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
     ]
     surge = np.concatenate([batch.velocity[:, 0] for batch in found.record.batches])
     speeds = (float(np.nanmin(surge)), float(np.nanmax(surge)))
-    model = replace(best.model, speeds_mps=speeds if np.isfinite(speeds).all() else None)
+    model = replace(best.model, speeds_mps=speeds if np.isfinite(speeds).all() else None, missed=found.missed)
     return vessel_toml(replace(vessel, model=model, std=best.std), comments=comments)
 
 

@@ -104,6 +104,8 @@ def _model(model: VesselModel) -> Iterator[str]:
     yield from ("", *toml_table("[model]", {"structure": structure, "form": model.form, **unstated}))
     if model.speeds_mps is not None:
         yield f"speeds_mps = [{', '.join(f'{speed:.4g}' for speed in model.speeds_mps)}]"
+    if model.missed is not None:
+        yield f"missed = {{ way_share = {model.missed.way_share:.4g}, turn_share = {model.missed.turn_share:.4g} }}"
     if structure == "custom":
         for term in model.terms:
             yield from ("", *toml_table("[[model.terms]]", vars(term)))

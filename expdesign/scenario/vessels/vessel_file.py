@@ -29,6 +29,7 @@ from expdesign.vessel import (
     Actuator,
     Inertia,
     Limit,
+    Missed,
     Response,
     Roll,
     RollPendulum,
@@ -183,6 +184,7 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
             if name not in table.parameter_std and table.parameter_std_unstated * value
         },
         speeds_mps=None if table.speeds_mps is None else (table.speeds_mps[0], table.speeds_mps[1]),
+        missed=None if table.missed is None else Missed(**table.missed.model_dump()),
         form=table.form,
         sample_time_s=sample_time_s,
         actuators=actuators,

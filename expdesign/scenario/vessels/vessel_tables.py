@@ -235,6 +235,13 @@ class InertiaTable(Table):
     )
 
 
+class MissedTable(Table):
+    """`model.missed`: what predictions as long as a standard trial miss of runs that they have not seen."""
+
+    way_share: NonNegative = Field(description="the standard deviation, as a share of the way sailed")
+    turn_share: NonNegative = Field(description="the standard deviation, as a share of the heading turned")
+
+
 class ModelTable(Table):
     """`[model]`."""
 
@@ -275,6 +282,12 @@ class ModelTable(Table):
         max_length=2,
         description="the least and the most surge speed of the data that determined the parameters, as estimate writes "
         "them: a dictionary or a plan that goes beyond is told of",
+    )
+    missed: MissedTable | None = Field(
+        default=None,
+        description="a table { way_share = 0.02, turn_share = 0.05 } of what predictions miss of runs that were left "
+        "out in turn, as estimate writes it: the intervals of indices count it, and without it what models of ships "
+        "that nobody measured miss",
     )
     terms: list[TermTable] = Field(default=[], description="the tables [[model.terms]] of structure 'custom'")
     roll: RollTable | None = Field(
