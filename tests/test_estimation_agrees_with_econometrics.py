@@ -1,13 +1,23 @@
 """An independent oracle: single-output IV, LS and their robust covariances as econometric packages compute them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.solve.solution import Weighting, solve_iv, solve_ls
 
-linearmodels = pytest.importorskip("linearmodels.iv")
-statsmodels = pytest.importorskip("statsmodels.api")
+
+@cache
+def linearmodels():
+    return pytest.importorskip("linearmodels.iv")  # takes a second, not of every worker
+
+
+@cache
+def statsmodels():
+    return pytest.importorskip("statsmodels.api")
+
 
 NAMES = ("a", "b", "c")
 
@@ -26,7 +36,7 @@ def errors_in_variables_case():
 @pytest.mark.parametrize(("ours", "debiased"), [("hc0", False), ("hc1", True)])
 def test_iv_and_its_heteroscedasticity_robust_covariance(ours: str, debiased: bool) -> None:
     Z, Phi, y = errors_in_variables_case()
-    theirs = linearmodels.IV2SLS(y, None, Phi, Z).fit(cov_type="robust", debiased=debiased)
+    theirs = linearmodels().IV2SLS(y, None, Phi, Z).fit(cov_type="robust", debiased=debiased)
     mine = solve_iv(single_output(Phi, y, parameters=NAMES), Z[:, None, :], Weighting(covariance=ours))
     np.testing.assert_allclose(mine.values, theirs.params, rtol=1e-6)
     np.testing.assert_allclose(mine.covariance, theirs.cov, rtol=1e-6)
@@ -36,7 +46,7 @@ def test_iv_and_its_heteroscedasticity_robust_covariance(ours: str, debiased: bo
 @pytest.mark.parametrize("lags", [1, 6, 40])
 def test_iv_and_its_autocorrelation_robust_covariance(kernel: str, lags: int) -> None:
     Z, Phi, y = errors_in_variables_case()
-    theirs = linearmodels.IV2SLS(y, None, Phi, Z).fit(cov_type="kernel", kernel=kernel, bandwidth=lags, debiased=True)
+    theirs = linearmodels().IV2SLS(y, None, Phi, Z).fit(cov_type="kernel", kernel=kernel, bandwidth=lags, debiased=True)
     weighting = Weighting(covariance="kernel", kernel=kernel, lags=lags)
     mine = solve_iv(single_output(Phi, y, parameters=NAMES), Z[:, None, :], weighting)
     np.testing.assert_allclose(mine.covariance, theirs.cov, rtol=1e-6, atol=1e-12)
@@ -45,7 +55,7 @@ def test_iv_and_its_autocorrelation_robust_covariance(kernel: str, lags: int) ->
 def test_zero_mean_instruments_are_a_constant_regressor() -> None:
     """Lemma 7.1 against somebody else's code."""
     Z, Phi, y = errors_in_variables_case()
-    theirs = linearmodels.IV2SLS(y + 3, np.ones((len(y), 1)), Phi + 1, Z).fit(cov_type="robust")
+    theirs = linearmodels().IV2SLS(y + 3, np.ones((len(y), 1)), Phi + 1, Z).fit(cov_type="robust")
     regression = single_output(Phi + 1, y + 3, parameters=NAMES)
     mine = solve_iv(regression, Z[:, None, :], Weighting(mean="complete", covariance="hc0"))
     np.testing.assert_allclose(mine.values, theirs.params.to_numpy()[1:], rtol=1e-6)
@@ -56,7 +66,7 @@ def test_instrument_blocks_per_batch_are_two_stage_least_squares() -> None:
     Z, Phi, y = errors_in_variables_case()
     batch = np.repeat([0, 1], [300, 400])
     blocks = np.concatenate([Z * (batch == number)[:, None] for number in (0, 1)], axis=1)
-    theirs = linearmodels.IV2SLS(y, None, Phi, blocks).fit(cov_type="robust")
+    theirs = linearmodels().IV2SLS(y, None, Phi, blocks).fit(cov_type="robust")
     mine = solve_iv(
         single_output(Phi, y, parameters=NAMES, batch=batch), Z[:, None, :], Weighting(blocks="batch", covariance="hc0")
     )
@@ -68,7 +78,7 @@ def test_instrument_blocks_per_batch_are_two_stage_least_squares() -> None:
 def test_least_squares_and_newey_west(lags: int) -> None:
     _, Phi, y = errors_in_variables_case()
     options = {"maxlags": lags, "use_correction": True}
-    theirs = statsmodels.OLS(y, Phi).fit(cov_type="HAC", cov_kwds=options)
+    theirs = statsmodels().OLS(y, Phi).fit(cov_type="HAC", cov_kwds=options)
     mine = solve_ls(
         single_output(Phi, y, parameters=NAMES), Weighting(covariance="kernel", kernel="bartlett", lags=lags)
     )

@@ -171,7 +171,10 @@ def _pooled(pool: Array, A: Array, B: Array) -> Array:
     return np.asarray(np.einsum("gn,nij->gij", pool, np.swapaxes(A, 1, 2) @ B))
 
 
-def halves_differ(one: YawEstimate, other: YawEstimate, *, factor: float = 3.0) -> Array:
+FACTOR = 3.0  # between parameters of two halves of a voyage, from which on they differ
+
+
+def halves_differ(one: YawEstimate, other: YawEstimate) -> Array:
     """(n, p) parameters of two halves of a voyage that differ by more than a factor, or in sign.
 
     Where they do although both halves are fitted alike, the voyage does not determine these parameters.
@@ -179,7 +182,7 @@ def halves_differ(one: YawEstimate, other: YawEstimate, *, factor: float = 3.0) 
     a, b = one.parameters, other.parameters
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = a / b
-    return np.asarray(~((ratio > 1.0 / factor) & (ratio < factor)))
+    return np.asarray(~((ratio > 1.0 / FACTOR) & (ratio < FACTOR)))
 
 
 INTERVAL_S = 5.0  # over which the equation is integrated [s]

@@ -43,21 +43,22 @@ STEPS = 15
 LARGEST_STEP = 0.5  # of a parameter in a step, as a share of its start
 SMALLEST_STEP = 1e-4  # below which there is no further one, as a share of the start
 SETTLED = 0.02  # largest last step, in standard errors
-SMOOTHING_S = 2.0  # of each half, so that products of noisy signals have little noise inside their absolute values [s]
+# length of the polynomials that smooth each half, so that products of noisy signals have little noise inside their
+# absolute values; less than five samples of a half are not smoothed [s]
+SMOOTHING_S = 2.0
 BLOCK_S = 20.0  # over which errors may hang together [s]
 
 
-def split(data: YawData, *, smoothing_s: float = SMOOTHING_S) -> tuple[YawData, YawData]:
+def split(data: YawData) -> tuple[YawData, YawData]:
     """The voyages by their even samples alone, and by their odd ones, each smoothed and filled in by cubic polynomials.
 
     Args:
         data: of n voyages, with noise that is independent from sample to sample.
-        smoothing_s: length of the polynomials that smooth [s]; less than five samples of a half are not smoothed.
 
     Returns:
         Both at the same times, those of the data but the first and the last ones.
     """
-    window = 2 * int(smoothing_s / (4.0 * data.sample_time_s)) + 1
+    window = 2 * int(SMOOTHING_S / (4.0 * data.sample_time_s)) + 1
     halves: tuple[dict[str, Array], dict[str, Array]] = ({}, {})
     for name in ("r", *INPUTS):
         even, odd = (_filled(_smooth(getattr(data, name)[:, first::2], window)) for first in (0, 1))
@@ -85,7 +86,6 @@ def estimate_yaw_by_instruments(
     start: Mapping[str, float],
     *,
     groups: NDArray[np.int_] | None = None,
-    smoothing_s: float = SMOOTHING_S,
 ) -> YawEstimate:
     """Parameters whose errors are orthogonal to sensitivities with other noise, by Newton's method.
 
@@ -93,7 +93,6 @@ def estimate_yaw_by_instruments(
         data: of n voyages.
         start: value of every parameter [SI] from which output error begins; instruments begin from its estimate.
         groups: as in `estimate_yaw`.
-        smoothing_s: as in `split`.
 
     Returns:
         The estimate of each group; nan where the steps do not settle, for instance for lack of information. Standard
@@ -104,7 +103,7 @@ def estimate_yaw_by_instruments(
     scale = np.array([abs(start[name]) for name in model.parameters])
     x = np.array(estimate_yaw(model, data, start, groups=groups).parameters / scale)
     low, high = signs(model)
-    halves, last = split(data, smoothing_s=smoothing_s), np.full(x.shape, np.inf)
+    halves, last = split(data), np.full(x.shape, np.inf)
     for _ in range(STEPS):
         simulated = [simulate_yaw(model, half, (x * scale)[owner]) for half in halves]
         errors = [half.r - rates for half, (rates, _) in zip(halves, simulated, strict=True)]
