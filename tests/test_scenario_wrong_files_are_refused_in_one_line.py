@@ -179,7 +179,8 @@ AREA_CASES = [
     ("south_deg = -0.01", "south_deg = 0.02", "bounds.north_deg", "is 0.01, expected more than south_deg = 0.02"),
     ("west_deg = -0.01", "west_deg = 0.02", "bounds.east_deg", "is 0.01, expected east of west_deg = 0.02"),
     ("west_deg = -0.01", "", "bounds.west_deg", "is missing, expected the western longitude"),
-    ("south_deg = -0.01", "south_deg = -5", "bounds", "cover 557 x 2 km from latitude -5 to 0.01"),
+    ("south_deg = -0.01", "south_deg = -5", "bounds", "cover 557 x 2.2 km from latitude -5 to 0.01"),
+    ("south_deg = -0.01", "south_deg = -88", "bounds", "at most 85 degrees from the equator"),
     (
         "west_deg = -0.01\nnorth_deg = 0.01\neast_deg = 0.01",
         "west_deg = 1\nnorth_deg = 0.01\neast_deg = 1.1",

@@ -12,6 +12,7 @@ from expdesign.scenario.charts.geojson_zones import open_geojson
 from expdesign.scenario.charts.zones import (
     KM_PER_DEGREE,
     LARGEST_EXTENT_KM,
+    LARGEST_LATITUDE_DEG,
     AreaTable,
     BoundsTable,
     Box,
@@ -105,10 +106,11 @@ def _checked_bounds(given: Box | None, chart: OpenChart, entry: Entry) -> Box:
     west, south, east, north = given or chart.extent
     height_km = (north - south) * KM_PER_DEGREE
     width_km = (east - west) * KM_PER_DEGREE * float(np.cos(np.radians((south + north) / 2)))
-    if max(height_km, width_km) > LARGEST_EXTENT_KM or max(-south, north) > 85:
+    if max(height_km, width_km) > LARGEST_EXTENT_KM or max(-south, north) > LARGEST_LATITUDE_DEG:
         found = "cover" if given else "are missing and the chart covers"
-        size = f"{height_km:.0f} x {width_km:.0f} km from latitude {south:.4g} to {north:.4g}"
-        raise entry.error(f"{found} {size}, expected at most {LARGEST_EXTENT_KM:g} km and no pole")
+        sides = " x ".join(f"{side:.0f}" if side >= 10.0 else f"{side:.2g}" for side in (height_km, width_km))
+        allowed = f"at most {LARGEST_EXTENT_KM:g} km, at most {LARGEST_LATITUDE_DEG:g} degrees from the equator"
+        raise entry.error(f"{found} {sides} km from latitude {south:.4g} to {north:.4g}, expected {allowed}")
     chart_west, chart_south, chart_east, chart_north = chart.extent
     extent = shapely.box(*chart.extent)
     if given and not shapely.box(*given).intersects(extent):

@@ -126,6 +126,7 @@ class AreaTable(Table):
 
 
 LARGEST_EXTENT_KM = 250.0  # of a sea area, so that a local frame holds it
+LARGEST_LATITUDE_DEG = 85.0  # the same, near a pole
 STEP_DEG = 0.005
 """Chart edges are straight in latitude and longitude; cut into pieces this long they are straight in the frame too,
 to a centimetre."""

@@ -76,7 +76,9 @@ class EnvironmentTable(Table):
     """`[environment]`."""
 
     current_to: CurrentTable = Field(
-        default=CurrentTable(north_mps=0.0, east_mps=0.0), description="the current, by where the water moves to"
+        default=CurrentTable(north_mps=0.0, east_mps=0.0),
+        description="the current, by where the water moves to: one mean for the whole area and trial, so that a tidal "
+        "stream that turns counts as its variation only",
     )
     wind_to: WindTable = Field(
         default=WindTable(north_mps=0.0, east_mps=0.0), description="the wind, by where the air moves to"
