@@ -26,7 +26,7 @@ MANY = 30  # tasks, more than are begun at once
 WAYS = (in_order, as_finished)
 
 
-@pytest.fixture(scope="module", params=[1, 2, 3])
+@pytest.fixture(scope="module", params=[1, 2, pytest.param(3, marks=pytest.mark.thorough)])
 def jobs(request: pytest.FixtureRequest) -> Iterator[int]:
     with local_processes(request.param):
         yield request.param
@@ -234,7 +234,7 @@ def test_no_process_outlives_its_block(tmp_path, ending):
     assert not living(tmp_path)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
 def test_ctrl_c_reaches_only_the_process_that_waits(tmp_path, count):
     """A terminal sends it to all processes of its group."""
     code = f"""
