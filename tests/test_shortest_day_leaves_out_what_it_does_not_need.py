@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.solve import draft_trial, redrafted
+from expdesign.plan.solve import draft_trial, find_legs, redrafted
 from expdesign.plan.values import Leg, Placement, PlanProblem
 from expdesign.progress import silent
 from expdesign.shortest_day.drafting import Drafting
@@ -68,6 +68,8 @@ def test_other_runs_and_their_legs_stay_as_they_are():
     alone = redrafted(one, draft, places[:1])
     assert alone is not None
     assert len(draft.known) == 3 + 1  # the leg past the second run is the only one sought
+    find_legs(problem, draft, [places[:1], places[1:], places[1:]])
+    assert len(draft.known) == 3 + 2  # the leg past the first is sought once
     kept = both.sailed.legs[1].last
     assert np.array_equal(alone.sailed.commands.values[:kept], both.sailed.commands.values[:kept])
     assert [leg.kind for leg in alone.sailed.legs] == ["reposition", "primitive", "reposition"]
@@ -98,6 +100,7 @@ def test_as_many_runs_are_left_out_as_the_accuracy_allows(monkeypatch, required,
     design = of_runs(1, 2, 1)
     design.problem.constraints.required = frozenset(required)
     drafting = Drafting(problem=SimpleNamespace(design=design), accuracy=accuracy)
+    monkeypatch.setattr("expdesign.shortest_day.drafting.find_legs", lambda *_: None)
     monkeypatch.setattr("expdesign.shortest_day.drafting.redrafted", lambda _, draft, places: places)
     monkeypatch.setattr(Drafting, "_of", lambda self, repeats: None)
     monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, places: day_of([one.primitive for one in places]))
@@ -124,6 +127,7 @@ def test_spare_runs_go_at_once_and_all_days_are_as_late_as_the_one_that_trials_a
         return 0.1 * sailed.legs_s
 
     module = "expdesign.shortest_day.drafting"
+    monkeypatch.setattr(f"{module}.find_legs", lambda *_: None)
     monkeypatch.setattr(f"{module}.redrafted", lambda _, draft, places: [one.primitive for one in places])
     monkeypatch.setattr(f"{module}.draft_trial", lambda problem, *, like, progress: days_of[problem])
     monkeypatch.setattr(f"{module}.drawn_lateness_s", lateness_s)

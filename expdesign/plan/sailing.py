@@ -1,8 +1,4 @@
-"""Sailing a trial run by run, stretch after stretch; where a leg or a run fails, the remaining runs are placed again.
-
-Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
-So the legs of a placement do not wait for each other, and processes share them.
-"""
+"""Sailing a trial run by run, stretch after stretch; where a leg or a run fails, the rest is placed again."""
 
 from __future__ import annotations
 
@@ -13,13 +9,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from expdesign.conventions import whole_turns
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
-from expdesign.memory import in_order, recalled
 from expdesign.plan.assembly import PlanRoom, phases_of
 from expdesign.plan.feasibility import LEG_S
-from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_state, nearest_turns
+from expdesign.plan.legs import FoundLeg, LegTask, LegWater, last_state, nearest_turns
+from expdesign.plan.legs_ahead import KnownLegs, LegAhead, leg_found, legs_ahead, remember
 from expdesign.plan.local_planner import Departure, LocalPlanner, SearchSpace
 from expdesign.plan.search import placed_runs
 from expdesign.plan.values import Leg, Placement, Placements, PlanProblem, PlanSettings, SailedTrial, WorkBudget
@@ -104,73 +99,6 @@ FAILURE_S = 2.0  # least cost of a failed placement [s]
 CLOCK_BUDGETS = 5.0  # time budgets by the clock after which a search that is stuck ends, whatever its counted work
 
 
-# Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LegAhead:
-    """A leg found ahead."""
-
-    task: LegTask  # as it was expected
-    commands: Array | None  # (k, m), or None where there is no leg
-    source: str  # what found its path
-    spent_s: float  # work that it took
-
-    def fitted(self, task: LegTask, water: LegWater) -> Array | None:
-        """The commands for the task as it has become, azimuths shifted by whole turns; None where they miss its end."""
-        if self.commands is None or np.array_equal(task.start, self.task.start):
-            return self.commands
-        expected = self.task.start_inputs
-        values = self.commands + nearest_turns(water.vessel, expected, task.start_inputs) - expected
-        heading = water.states(task.start, values, task.past)[-1, 2]
-        end = np.r_[task.end[:2], task.end[2] + whole_turns(heading - task.end[2]), task.end[3:]]
-        return values if acceptable(task.start, end, water, values, task.past) else None
-
-
-KnownLegs = dict[tuple[bytes, ...], LegAhead]
-"""Legs found before, by all that decides them but chance."""
-
-
-def legs_ahead(
-    planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask], known: KnownLegs | None = None
-) -> Iterator[LegAhead]:
-    """The legs of tasks, in order; those known are not sought again, and those found become known."""
-    if known is None:
-        return in_order(_found, (planner, water), ((task,) for task in tasks))
-    listed = list(tasks)
-    fresh = [task for task in listed if _place(task) not in known]
-    if len(fresh) == 1:  # found here before another process has the water
-        remember(known, leg_found(planner, water, fresh[0]))
-    else:
-        known |= zip(map(_place, fresh), in_order(_found, (planner, water), ((task,) for task in fresh)), strict=True)
-    return (known[_place(task)] for task in listed)
-
-
-def remember(known: KnownLegs, ahead: LegAhead) -> None:
-    """Make a leg known."""
-    known[_place(ahead.task)] = ahead
-
-
-def _place(task: LegTask) -> tuple[bytes, ...]:
-    ends = task.start, task.end, task.start_inputs, task.end_inputs, task.past
-    return tuple(np.asarray(part, dtype=float).tobytes() for part in ends)
-
-
-def leg_found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
-    """The leg of a task."""
-    return recalled(_found, planner, water, task)
-
-
-def _found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
-    leg = planner.leg(task, water)
-    return LegAhead(
-        task=task,
-        commands=None if leg is None else leg.commands,
-        source="" if leg is None else leg.source,
-        spent_s=task.budget.spent_s,
-    )
-
-
 GOAL = "goal"
 
 
@@ -234,6 +162,26 @@ def sail_placed(
         if voyage.sail_run(placement, next(legs)):
             return None
     return voyage.sailed if voyage.sail_home(next(legs)) else None
+
+
+def know_legs(
+    problem: PlanProblem,
+    room: PlanRoom,
+    choices: Iterable[Sequence[Placement]],
+    *,
+    stated: LegWater,
+    known: KnownLegs,
+) -> None:
+    """Make the legs known that `sail_placed` would seek for each of several choices of placements.
+
+    Args:
+        problem, room, stated, known: as of `sail_placed`.
+        choices: of placements.
+    """
+    planner, budget = room.space.planner, WorkBudget()
+    voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=planner, budget=budget, known=known)
+    tasks = [task for placements in choices for task in voyage.tasks_ahead(placements)]
+    legs_ahead(planner, room.water, tasks, known)
 
 
 def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTrial:
@@ -337,6 +285,10 @@ class _Voyage:
 
     def legs_ahead(self, placements: Sequence[Placement], known: KnownLegs | None = None) -> Iterator[LegAhead]:
         """Legs to runs, in this order, and on to the goal, as far as can be known now."""
+        return legs_ahead(self.planner, self.water, self.tasks_ahead(placements), known)
+
+    def tasks_ahead(self, placements: Sequence[Placement]) -> list[LegTask]:
+        """What these legs have to do."""
         runs = [self._primitive(placement) for placement in placements]
         entries = [self._entry(placement, run) for placement, run in zip(placements, runs, strict=True)]
         ends = [*zip(entries, (run.entry_inputs for run in runs), strict=True), self._stop]
@@ -345,7 +297,7 @@ class _Voyage:
             values = run.commands.values
             left = self.water.states(entry, values, run.entry_inputs[None])[-1]
             tasks.append(self._task(left, values[-1], values, *end, stretches=2 * number))
-        return legs_ahead(self.planner, self.water, tasks, known)
+        return tasks
 
     def sail_run(self, placement: Placement, ahead: LegAhead) -> str:
         """Sail to a placement and do its run; "" on success, else what failed."""

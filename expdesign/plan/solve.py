@@ -6,7 +6,7 @@ A plan that drawn trials leave is made anew with more room, and refused when tha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -35,6 +35,7 @@ from expdesign.plan.chart import reachable
 from expdesign.plan.checked import Refused, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
+from expdesign.plan.legs_ahead import KnownLegs
 from expdesign.plan.monte_carlo import (
     Trials,
     failed_chance_constraint,
@@ -44,7 +45,7 @@ from expdesign.plan.monte_carlo import (
 )
 from expdesign.plan.remedies import REPLANS, advised
 from expdesign.plan.runs import draws_for
-from expdesign.plan.sailing import KnownLegs, sail_all, sail_placed
+from expdesign.plan.sailing import know_legs, sail_all, sail_placed
 from expdesign.plan.values import Leg, Placement, Plan, PlanProblem, RiskEstimate, SailedTrial, Verification, WorkBudget
 from expdesign.plan.verify import realised_efficiencies
 from expdesign.progress import Progress, never_falling, silent
@@ -347,6 +348,17 @@ def redrafted(problem: PlanProblem, draft: Draft, placements: Sequence[Placement
     room = replace(draft.room, space=replace(draft.room.space, footprints=runs))
     sailed = sail_placed(problem, room, placements, stated=draft.water, budget=budget, known=draft.known)
     return None if sailed is None else _measured(draft.area, draft.water, room, sailed, budget.spent_s, draft.known)
+
+
+def find_legs(problem: PlanProblem, draft: Draft, choices: Iterable[Sequence[Placement]]) -> None:
+    """Make the legs known, beside each other, that `redrafted` would seek for each of several choices of placements.
+
+    Args:
+        problem: the trial with all runs of the draft.
+        draft: as of `redrafted`.
+        choices: of placements.
+    """
+    know_legs(replace(problem, area=draft.area), draft.room, choices, stated=draft.water, known=draft.known)
 
 
 def _measured(

@@ -14,7 +14,7 @@ import numpy as np
 from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NotInformative
 from expdesign.plan.checked import drawn_lateness_s
-from expdesign.plan.solve import Draft, draft_trial, redrafted
+from expdesign.plan.solve import Draft, draft_trial, find_legs, redrafted
 from expdesign.plan.values import Placement, PlanProblem, SailedTrial
 from expdesign.plan.verify import expected_errors, track_information
 from expdesign.processes import in_order
@@ -57,7 +57,9 @@ class Drafting:
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
         """The day, or a shorter one with fewer of its runs that reaches the accuracy too."""
         while True:
-            drafts = (self._redrafted(day.draft, rest) for rest in _with_one_fewer(day, self.accuracy))
+            fewer = _with_one_fewer(day, self.accuracy)
+            find_legs(self._of(day.repeats), day.draft, fewer)
+            drafts = (self._redrafted(day.draft, rest) for rest in fewer)
             shorter = (other for other in drafts if other and other.margin >= 0 and other.day_s < day.day_s)
             found = next(shorter, None)
             if found is None:
