@@ -13,10 +13,12 @@ from expdesign.plan.local_planner import Departure, SearchSpace, TriedTransition
 from expdesign.plan.search import local_search
 from expdesign.plan.search.local_search import (
     MOST_POSES,
+    _Legs,
     _longest_block,
     measured_s,
     polished,
     runs_clear,
+    with_another,
 )
 from plan_case import leg_water, primitive, space_of
 
@@ -46,6 +48,32 @@ def test_legs_take_less_time_and_runs_and_paths_stay_in_the_water(space):
     )
     assert runs_clear(space, np.zeros(3, dtype=int), found.poses).all()
     assert polished(space, ends, [0, 0, 0], found.poses).seconds == pytest.approx(found.seconds, abs=0.5)
+
+
+@pytest.mark.parametrize("leg", [1, 2, 3])
+def test_another_run_is_put_where_no_move_of_it_makes_the_legs_shorter(space, leg):
+    """The others stay where they are."""
+    ends = Departure(pose=START)
+    found, runs = with_another(space, ends, [0, 0, 0], POSES, leg=leg, run=0), [0, 0, 0, 0]
+    assert found is not None
+    np.testing.assert_array_equal(np.delete(found.poses, leg, axis=0), POSES)
+    before_s, after_s = measured_s(space, [0, 0, 0], POSES, ends), measured_s(space, runs, found.poses, ends)
+    assert found.seconds == pytest.approx(after_s - before_s)
+    assert runs_clear(space, np.zeros(4, dtype=int), found.poses).all()
+    legs = _Legs(space=space, departure=ends)
+    chain = legs.measured(np.array(runs), found.poses)
+    assert legs.moved(chain, leg, leg) is chain
+
+
+@pytest.mark.parametrize(("width_m", "found"), [(40.0, False), (200.0, True)])
+def test_a_run_needs_room_in_a_leg(width_m, found):
+    """In a channel between two basins in which no run has room beside the legs to it and on from it."""
+    basins = [shapely.box(-420, -60, -300, 60), shapely.box(300, -60, 420, 60)]
+    water = shapely.union_all([*basins, shapely.box(-310, -width_m / 2, 310, width_m / 2)])
+    ends = Departure(pose=np.array([0.0, -310.0, np.pi / 2]))
+    space = placed_in(water, np.array([0.0, 310.0, 0.0]))
+    another = with_another(space, ends, [], np.zeros((0, 3)), leg=0, run=0)
+    assert (another is not None) == found
 
 
 def test_no_plan_takes_less_than_its_path_at_full_speed(space):

@@ -1,6 +1,7 @@
-"""Runs that a drafted day does not need are left out, and the others stay where they are."""
+"""Runs are left out of a drafted day, and put in, one at a time, and the others stay where they are."""
 
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.solve import draft_trial, find_legs, redrafted
+from expdesign.plan.drafts import another_in_leg, find_legs, redrafted
+from expdesign.plan.solve import draft_trial
 from expdesign.plan.values import Leg, Placement, PlanProblem
 from expdesign.progress import silent
 from expdesign.shortest_day.drafting import Drafting
@@ -21,6 +23,7 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 TOLD = {"much": 5.0, "little": 1.0, "less": 0.5}
 NAMES = tuple(TOLD)
 NEEDED = 6.5
+TAKES_S = {"much": 60, "little": 60, "less": 60}
 
 
 @dataclass(frozen=True)
@@ -30,13 +33,15 @@ class FewDraft:
     sailed: SimpleNamespace
     made_good_m: np.ndarray
     late_s: np.ndarray
+    room: SimpleNamespace
     transit_mps: float = 1.0
+    direct_s: float = 0.0
     area: None = None
     water: None = None
 
 
 def of_runs(*counts: int) -> SimpleNamespace:
-    limits = SimpleNamespace(least_s={}, required=frozenset())
+    limits = SimpleNamespace(least_s={}, most_s={}, required=frozenset())
     return SimpleNamespace(
         problem=SimpleNamespace(names=NAMES, run_s=np.full(3, 60.0), constraints=limits), repeats=counts
     )
@@ -75,21 +80,30 @@ def test_other_runs_and_their_legs_stay_as_they_are():
     assert [leg.kind for leg in alone.sailed.legs] == ["reposition", "primitive", "reposition"]
     assert alone.sailed.trajectory.pose[-1, :2] == pytest.approx(problem.goal[:2], abs=0.03)
     assert alone.sailed.day_s < both.sailed.day_s
+    placed = {leg: another_in_leg(problem, draft, leg, 0) for leg in range(3)}
+    leg, (run, more_s) = min(((k, one) for k, one in placed.items() if one is not None), key=lambda one: one[1][1])
+    three = replace(problem, design=SimpleNamespace(problem=problem.design.problem, repeats=(3,)))
+    more = redrafted(three, draft, [*places[:leg], run, *places[leg:]])
+    assert more is not None
+    assert len(draft.known) == 3 + 2 + 2  # the legs to the new run and on from it
+    assert more.sailed.day_s - both.sailed.day_s == pytest.approx(more_s, rel=0.2)
 
 
-def day_of(runs: list[str]) -> DraftedDay:
-    """A day in which every leg takes 10 s, every run 60 s, and legs tell a fifth of a unit."""
+def day_of(runs: list[str], *, takes_s: dict[str, int] = TAKES_S, needed: float = NEEDED) -> DraftedDay:
+    """A day in which every leg takes 10 s and tells a fifth of a unit."""
     kinds = [part for name in runs for part in (("reposition", name), ("primitive", name))] + [("reposition", "goal")]
-    lengths = [60 if kind == "primitive" else 10 for kind, _ in kinds]
+    lengths = [takes_s[name] if kind == "primitive" else 10 for kind, name in kinds]
     ends = np.cumsum([0, *lengths]).tolist()
     legs = tuple(Leg(kind=k, name=n, first=a, last=b) for (k, n), a, b in zip(kinds, ends, ends[1:], strict=False))
     told = np.array([TOLD[name] if kind == "primitive" else 0.2 for kind, name in kinds])
     places = tuple(Placement(primitive=name, pose=np.zeros(3)) for name in runs)
     sailed = SimpleNamespace(legs=legs, legs_s=np.array(lengths, dtype=float), day_s=float(ends[-1]), placements=places)
-    draft = FewDraft(sailed=sailed, made_good_m=np.zeros(len(legs)), late_s=np.zeros(len(legs)))
+    footprints = [SimpleNamespace(name=name, duration_s=takes_s[name], displacement_m=0.0) for name in set(runs)]
+    room = SimpleNamespace(space=SimpleNamespace(footprints=footprints))
+    draft = FewDraft(sailed=sailed, made_good_m=np.zeros(len(legs)), late_s=np.zeros(len(legs)), room=room)
     repeats = tuple(runs.count(name) for name in NAMES)
     return DraftedDay(
-        repeats=repeats, draft=draft, information=told[:, None, None], margin=float(np.log(told.sum() / NEEDED))
+        repeats=repeats, draft=draft, information=told[:, None, None], margin=float(np.log(told.sum() / needed))
     )
 
 
@@ -105,10 +119,46 @@ def test_as_many_runs_are_left_out_as_the_accuracy_allows(monkeypatch, required,
     monkeypatch.setattr(Drafting, "_of", lambda self, repeats: None)
     monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, places: day_of([one.primitive for one in places]))
     begun = day_of(["much", "little", "less", "little"])
-    found = drafting.without_spare_runs(begun)
+    found, short = drafting.without_spare_runs(begun, 0.0)
     assert found.repeats == tuple(left.count(name) for name in NAMES)
     assert found.margin >= 0
-    assert drafting.without_spare_runs(found) is found
+    assert drafting.without_spare_runs(found, 0.0)[0] is found
+    assert all(day.margin < 0 and day.day_s < begun.day_s for day in short)
+
+
+@pytest.mark.parametrize(
+    ("begun", "needed"),
+    [
+        (["much", "little", "less"], 6.7),  # "little" has to go, and "less" to be done twice
+        (["much", "less"], 6.5),  # falls short: "less" twice
+        (["much", "little"], 6.5),  # nothing is shorter
+        (["little", "less"], 1.7),  # "less" is enough, alone and twice
+    ],
+)
+def test_no_day_of_such_runs_is_shorter_than_the_one_found(monkeypatch, begun, needed):
+    """Of all days with runs of the same kinds."""
+    takes_s = {"much": 60, "little": 20, "less": 12}
+    module = "expdesign.shortest_day.drafting"
+
+    def day(names):
+        return day_of(names, takes_s=takes_s, needed=needed)
+
+    def another(problem, draft, leg, run):
+        names = [item.primitive for item in draft.sailed.placements]
+        names.insert(leg, draft.room.space.footprints[run].name)
+        return Placement(primitive=names[leg], pose=np.zeros(3)), takes_s[names[leg]] + 10.0
+
+    monkeypatch.setattr(f"{module}.find_legs", lambda *_: None)
+    monkeypatch.setattr("expdesign.shortest_day.more_runs.another_in_leg", another)
+    monkeypatch.setattr(f"{module}.redrafted", lambda _, draft, places: [one.primitive for one in places])
+    monkeypatch.setattr(Drafting, "_of", lambda self, repeats: self.problem)
+    monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, names: day(names))
+    accuracy = SimpleNamespace(margin=lambda M: float(np.log(M[0, 0] / needed)))
+    drafting = Drafting(problem=SimpleNamespace(design=of_runs(0, 0, 0)), accuracy=accuracy)
+    found = drafting.shortest_near(day(begun), 0.0)
+    assert found.margin >= 0
+    others = [day(list(runs)) for n in range(1, 6) for runs in combinations_with_replacement(sorted(set(begun)), n)]
+    assert found.day_s == min(other.day_s for other in others if other.margin >= 0)
 
 
 @pytest.mark.parametrize(("fullest", "kept"), [(False, [8, 4, 2, 4, 2]), (True, [8, 4, 4])])
@@ -134,9 +184,11 @@ def test_spare_runs_go_at_once_and_all_days_are_as_late_as_the_one_that_trials_a
     monkeypatch.setattr(f"{module}.replace", lambda problem, **_: problem)
     monkeypatch.setattr(Drafting, "_of", lambda self, repeats: sum(repeats))
     monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, names: day_of(names))
+    monkeypatch.setattr(f"{module}.with_more", lambda *_: None)
     days: list[DraftedDay] = []
     for repeats in ((0, 0, 8), (1, 2, 1), (1, 2, 1)):
         days = drafting.with_another(days, repeats, silent)
     assert [sum(day.repeats) for day in days] == kept
     assert len(drawn) == 1
-    assert [day.expected_s for day in days] == pytest.approx([1.1 * day.day_s for day in days])
+    late_s = [0.1 * days[0].day_s / 8 * sum(day.repeats) for day in days]
+    assert [day.expected_s - day.day_s for day in days] == pytest.approx(late_s)

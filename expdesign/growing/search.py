@@ -189,7 +189,7 @@ BATCH = 512  # runs simulated together
 LEADERS = 4  # best candidates of each family from which local steps start
 OFFSPRING = 6  # local steps from each leader in one generation
 # size of the local steps of each generation, as a share of each setting's range
-STRIDES = (0.25, 0.15, 0.1, 0.06, 0.04, 0.025, 0.015, 0.01)
+STRIDES = (0.25, 0.13, 0.065, 0.03, 0.012)
 REDRAWN = 0.3  # share of local steps that take another random draw, where the family has one
 LEAST_COST = 0.02  # least cost of a second of a run that makes way good, in seconds
 

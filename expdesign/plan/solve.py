@@ -6,7 +6,7 @@ A plan that drawn trials leave is made anew with more room, and refused when tha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -24,7 +24,6 @@ from expdesign.plan.assembly import (
     dispersions,
     footprints,
     phases_of,
-    roomy_water,
     search_space,
     ship_on_legs,
     top_mps,
@@ -34,8 +33,8 @@ from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
 from expdesign.plan.checked import Refused, drawn_risk, verified
 from expdesign.plan.control import Capability
+from expdesign.plan.drafts import Draft, budget_of, drafted
 from expdesign.plan.legs import LegWater
-from expdesign.plan.legs_ahead import KnownLegs
 from expdesign.plan.monte_carlo import (
     Trials,
     failed_chance_constraint,
@@ -45,12 +44,11 @@ from expdesign.plan.monte_carlo import (
 )
 from expdesign.plan.remedies import REPLANS, advised
 from expdesign.plan.runs import draws_for
-from expdesign.plan.sailing import know_legs, sail_all, sail_placed
-from expdesign.plan.values import Leg, Placement, Plan, PlanProblem, RiskEstimate, SailedTrial, Verification, WorkBudget
+from expdesign.plan.sailing import sail_all
+from expdesign.plan.values import Leg, Plan, PlanProblem, RiskEstimate, SailedTrial, Verification, WorkBudget
 from expdesign.plan.verify import realised_efficiencies
 from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
-from expdesign.values import Array, sealed
 
 LEAST_CONFIDENCE = 0.5  # below which none is named as a remedy
 WIDENING = 1.4  # factor on a run's room then; legs get the same share of a hull length more clearance
@@ -140,7 +138,6 @@ def replanning_progress(progress: Progress, attempt: int) -> Progress:
     return lambda activity, share: progress(f"{which}: {activity}", math.nan)
 
 
-REPLAN_BUDGETS = 2.0  # time budgets of counted work within which a replan must be expected to end
 # share of the distance that the plan's time allows at top speed, beyond start and goal, from which a plan cannot return
 # in that time; half, and some for speeds that legs begin and end with
 BOUND_REACH = 0.6
@@ -207,7 +204,7 @@ def _in_water(
 
 def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress) -> Plan:
     """The trial planned in a part of the water, checked with all of it."""
-    return _checked(whole, _drafted(whole, area, ship, progress), progress)
+    return _checked(whole, drafted(whole, area, ship, progress), progress)
 
 
 def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
@@ -220,7 +217,7 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
         phases_of(problem, room.space.planner, progress).trials("verifying", 0.0)
         return _plan(whole, draft.sailed, verification=verified(whole, water, draft.sailed), bound_s=0.0)
     confidence = problem.settings.confidence
-    budget = _budget(problem)
+    budget = budget_of(problem)
     sailed, before_s, budget.spent_s, reported = draft.sailed, 0.0, draft.spent_s, progress
     made = list[Refused]()
     for attempt in range(REPLANS + 1):
@@ -280,35 +277,6 @@ def _aborted(plan: Plan) -> float:
     return 0.0 if plan.risk is None else plan.risk.aborted
 
 
-def _budget(problem: PlanProblem) -> WorkBudget:
-    return WorkBudget(most_s=REPLAN_BUDGETS * problem.settings.time_budget_s)
-
-
-@sealed(made_good_m="legs", late_s="legs")
-class Draft:
-    """A trial as sailed by the planner, before verification, risk and bound."""
-
-    area: SeaArea  # part of the chart that it is planned in
-    # water, room: what legs and runs keep to, as stated and as planned with
-    water: LegWater
-    room: PlanRoom
-    spent_s: float  # counted work
-    sailed: SailedTrial  # commands, motion and legs
-    direct_s: float  # time of the shortest path from start to goal at transit speed [s]
-    transit_mps: float  # that speed [m/s]
-    made_good_m: Array  # (legs,) by how much each run or leg shortens the way to the goal
-    # (legs,) by how much longer than planned drawn trials take on each, on average, go-arounds included [s]; zero where
-    # it is not known
-    late_s: Array
-    known: KnownLegs  # legs found for it, which a like trial need not seek again
-
-    @property
-    def runs_beyond_s(self) -> float:
-        """Time of the runs beyond what the distance that they make good takes at transit speed [s]."""
-        runs = [leg.kind == "primitive" for leg in self.sailed.legs]
-        return self.sailed.seconds("primitive") - float(self.made_good_m[runs].sum()) / self.transit_mps
-
-
 def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Progress = silent) -> Draft:
     """The trial of `plan_trial` without the checks, for comparing trials.
 
@@ -319,67 +287,7 @@ def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Pr
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg.
     """
-    return _in_water(problem, never_falling(progress), partial(_drafted, like=like), like)
-
-
-def _drafted(
-    whole: PlanProblem, area: SeaArea, ship: Capability, progress: Progress, like: Draft | None = None
-) -> Draft:
-    progress("measuring the water", 0.0)
-    problem = replace(whole, area=area)
-    water, room = roomy_water(problem, ship, progress, None if like is None else like.room)
-    budget, known = _budget(problem), KnownLegs()
-    sailed = sail_all(problem, room, progress, stated=water, budget=budget, known=known)
-    return _measured(area, water, room, sailed, budget.spent_s, known)
-
-
-def redrafted(problem: PlanProblem, draft: Draft, placements: Sequence[Placement]) -> Draft | None:
-    """The draft of a trial with other runs at given places, in this order; None where a leg or a run is not found.
-
-    Legs that are known from the draft are not sought again, and those found become known.
-
-    Args:
-        problem: the trial; its runs are among those of the draft.
-        draft: of the same trial with other runs; its water is used.
-        placements: of all runs.
-    """
-    problem, budget, used = replace(problem, area=draft.area), _budget(problem), {run.name for run in problem.used}
-    runs = tuple(run for run in draft.room.space.footprints if run.name in used)
-    room = replace(draft.room, space=replace(draft.room.space, footprints=runs))
-    sailed = sail_placed(problem, room, placements, stated=draft.water, budget=budget, known=draft.known)
-    return None if sailed is None else _measured(draft.area, draft.water, room, sailed, budget.spent_s, draft.known)
-
-
-def find_legs(problem: PlanProblem, draft: Draft, choices: Iterable[Sequence[Placement]]) -> None:
-    """Make the legs known, beside each other, that `redrafted` would seek for each of several choices of placements.
-
-    Args:
-        problem: the trial with all runs of the draft.
-        draft: as of `redrafted`.
-        choices: of placements.
-    """
-    know_legs(replace(problem, area=draft.area), draft.room, choices, stated=draft.water, known=draft.known)
-
-
-def _measured(
-    area: SeaArea, water: LegWater, room: PlanRoom, sailed: SailedTrial, spent_s: float, known: KnownLegs
-) -> Draft:
-    """A draft and what it makes good."""
-    ends = [0, *(leg.last for leg in sailed.legs)]
-    left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
-    speed = water.ship.transit_speed_mps
-    return Draft(
-        area=area,
-        water=water,
-        room=room,
-        spent_s=spent_s,
-        sailed=sailed,
-        direct_s=float(left_m[0]) / speed,
-        transit_mps=speed,
-        made_good_m=-np.diff(left_m),
-        late_s=np.zeros(len(sailed.legs)),
-        known=known,
-    )
+    return _in_water(problem, never_falling(progress), partial(drafted, like=like), like)
 
 
 def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Callable[..., Any]) -> Any:

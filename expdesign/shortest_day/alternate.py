@@ -14,7 +14,8 @@ from functools import partial
 import numpy as np
 
 from expdesign.errors import NoAnswer, NoPlan, NoRoom
-from expdesign.plan.solve import Draft, plan_drafted, with_advice
+from expdesign.plan.drafts import Draft
+from expdesign.plan.solve import plan_drafted, with_advice
 from expdesign.plan.values import Plan, PlanProblem, SailedTrial
 from expdesign.processes import in_order
 from expdesign.progress import Progress, in_phases, never_falling, of_part, silent
@@ -27,6 +28,7 @@ from expdesign.shortest_day.values import DayBound, DayParts, DayTried, Shortest
 from expdesign.values import Array
 
 ROUNDS = 5  # most days that are planned in search of the shortest
+ENOUGH = 2  # days planned, after which one that reaches the accuracy is enough
 
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
@@ -204,12 +206,15 @@ class _Search:
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy, by some margin; else those that come nearest.
 
-        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included.
+        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included, or that
+        is one of enough days tried.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
+        if np.isfinite(reached_s) and len(tried) >= ENOUGH:
+            return None
         least = 0.0 if np.isfinite(reached_s) else PROMISED
         known, short = {other.repeats for other in tried} | {day.repeats for day in days}, list[_Foreseen]()
         for step in range(LEVEL_STEPS):

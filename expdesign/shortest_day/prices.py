@@ -17,7 +17,7 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.information.disturbed import bordered_runs
 from expdesign.plan.assembly import ship_on_legs
-from expdesign.plan.solve import Draft
+from expdesign.plan.drafts import Draft
 from expdesign.plan.values import PlanProblem
 from expdesign.signals import Trajectory
 from expdesign.values import Array, sealed
@@ -140,9 +140,16 @@ class DraftedDay:
         """The day whose legs take drawn trials so much longer (legs,) [s]."""
         return replace(self, draft=replace(self.draft, late_s=late_s), drawn=True)
 
-    def taken_late(self, share: float) -> DraftedDay:
-        """The day whose legs are taken to take longer by a share."""
-        return replace(self, draft=replace(self.draft, late_s=share * self.draft.sailed.legs_s))
+    def taken_late(self, run_s: float) -> DraftedDay:
+        """The day whose legs to runs are taken to take so much longer each [s]."""
+        legs = self.draft.sailed.legs
+        to_runs = [leg.kind == "primitive" for leg in legs[1:]] + [False]
+        return replace(self, draft=replace(self.draft, late_s=run_s * np.array(to_runs, dtype=float)))
+
+    @property
+    def late_run_s(self) -> float:
+        """How late drawn trials are for each run, on average [s]."""
+        return float(self.draft.late_s.sum()) / max(sum(self.repeats), 1)
 
 
 def first_prices(problem: PlanProblem) -> Prices:
@@ -168,11 +175,8 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
         placeless: not offered, as they have no place in the water, unless the limits require them.
     """
     durations, limits = problem.design.problem, problem.design.problem.constraints
-    names, run_s = durations.names, durations.run_s
-    barred = set(limits.excluded) - set(free)
-    most_s = np.array([0.0 if name in barred else limits.most_s.get(name, np.inf) for name in names])
-    fewest = fewest_runs(problem)
-    most = np.minimum(np.floor(most_s / run_s), MOST_RUNS)
+    names, barred = durations.names, set(limits.excluded) - set(free)
+    fewest, most = fewest_runs(problem), np.where([name in barred for name in names], 0.0, most_runs(problem))
     return Offer(
         matrices=prices.runs + prices.leg,
         cost_s=prices.cost_s,
@@ -190,6 +194,13 @@ def fewest_runs(problem: PlanProblem) -> Array:
     least_s = np.array([limits.least_s.get(name, 0.0) for name in durations.names])
     required = np.array([float(name in limits.required) for name in durations.names])
     return np.asarray(np.maximum(np.ceil(least_s / durations.run_s), required))
+
+
+def most_runs(problem: PlanProblem) -> Array:
+    """(q,) of each primitive, by the limits on durations, whether or not it is excluded."""
+    durations, limits = problem.design.problem, problem.design.problem.constraints
+    most_s = np.array([limits.most_s.get(name, np.inf) for name in durations.names])
+    return np.asarray(np.minimum(np.floor(most_s / durations.run_s), MOST_RUNS))
 
 
 def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -> Offer:

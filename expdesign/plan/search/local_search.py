@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 import shapely
 
-from expdesign.conventions import wrap_angle
+from expdesign.conventions import rotated, wrap_angle
 from expdesign.plan.chart import sight_lines
 from expdesign.plan.local_planner import Departure, LegEnds, Pair, RunSpace, SearchSpace, Successors, arc_end, run_ends
 from expdesign.values import Array, sealed
@@ -27,6 +27,9 @@ MOST_POSES = 10_000  # in the blocks of a sweep: all blocks of up to 37 runs, an
 SWEEPS = 20  # over all blocks of runs at most
 SAME = 1e-3  # hull lengths and radians by which a leg may differ from a transition that was tried
 EQUAL = 6  # decimals to which times [s] are compared, so that rounding does not choose between mirror images
+# where another run is tried by a stretch of a leg: shares of it, hulls beside it, and its course from the stretch's
+SHARES, ASIDE_HULLS = tuple(np.linspace(0.05, 0.95, 10).tolist()), (0.0, -2.0, 2.0, -4.0, 4.0, -7.0, 7.0, -10.0, 10.0)
+ASIDE_DEG = (0.0, -45.0, 45.0, -90.0, 90.0, 180.0)
 LEAST_GAIN_S = 0.05  # for which a block is moved
 
 
@@ -184,6 +187,53 @@ def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, departure:
     return float(_Legs(space=space, departure=departure).measured(np.asarray(runs), poses).legs_s.sum())
 
 
+def with_another(
+    space: SearchSpace, departure: Departure, runs: Sequence[int], poses: Array, *, leg: int, run: int
+) -> Polished | None:
+    """The runs with another within a leg, where it suits the legs beside it best; None where that has no room for it.
+
+    It is tried along and beside the longest straight stretch of the leg, and then moved and turned while that makes
+    legs shorter. The others stay where they are.
+
+    Args:
+        space, departure, runs, poses: as of `polished`.
+        leg: number of the leg; that of the last leads to the goal.
+        run: index of the primitive.
+
+    Returns:
+        Poses of all runs, and by how much longer all legs are together.
+    """
+    legs, placed = _Legs(space=space, departure=departure), np.array(runs, dtype=int)
+    froms, tos = legs.ends(placed, poses)
+    path = space.goal_distance.graph.shortest(froms[leg, :2], tos[leg, :2])
+    if path is None or len(path) < 2:
+        return None
+    stretch = int(np.hypot(*np.diff(path, axis=0).T).argmax())
+    beside = _beside(space, path[stretch], path[stretch + 1], run)
+    grown = np.insert(placed, leg, run)
+    bends = path[1 : stretch + 1], path[stretch + 1 : -1]
+    pose = legs.first_place(grown, leg, beside, froms[leg : leg + 1], tos[leg : leg + 1], bends)
+    if pose is None:
+        return None
+    chain, moves = legs.measured(grown, np.insert(poses, leg, pose, axis=0)), 0
+    while moves < SWEEPS and (moved := legs.moved(chain, leg, leg)) is not chain:
+        chain, moves = moved, moves + 1
+    more_s = float(chain.legs_s.sum()) - float(legs.measured(placed, poses).legs_s.sum())
+    return Polished(poses=chain.poses, seconds=more_s, moves=moves)
+
+
+def _beside(space: SearchSpace, begin: Array, end: Array, run: int) -> Array:
+    """(n, 3) poses from which a run makes its way good along a stretch, on it or beside it, or to other courses."""
+    along, item = end - begin, space.footprints[run]
+    course = np.arctan2(along[1], along[0])
+    shares, aside_m, turns = np.meshgrid(SHARES, space.hull_m * np.array(ASIDE_HULLS), np.radians(ASIDE_DEG))
+    headings = (course + turns - item.course_rad).ravel()
+    across = np.array([-np.sin(course), np.cos(course)])
+    middles = begin + shares.ravel()[:, None] * along + aside_m.ravel()[:, None] * across
+    way = np.column_stack(rotated(item.displacement[:2, None], headings))
+    return np.column_stack([middles - way / 2, headings])
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Legs:
     """Legs of chains that begin and end at the same places."""
@@ -193,7 +243,7 @@ class _Legs:
 
     def measured(self, runs: np.ndarray, poses: Array) -> Chain:
         """A chain with the shortest paths for its legs."""
-        froms, tos = self._ends(runs, poses)
+        froms, tos = self.ends(runs, poses)
         paths = [self.space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
         bends = tuple(np.zeros((0, 2)) if path is None else path[1:-1] for path in paths)
         legs_s = [
@@ -209,7 +259,7 @@ class _Legs:
         if bent or self._kept(chain.runs, i) or self._kept(chain.runs, j + 1):
             return chain
         blocks = self._blocks(chain, i, j)
-        froms, tos = self._ends(chain.runs, chain.poses)
+        froms, tos = self.ends(chain.runs, chain.poses)
         leaving = run_ends(self.space, np.full(len(blocks), chain.runs[j]), blocks[:, -1])
         arrive_s = self._leg_s(chain.runs, i, froms[i : i + 1], blocks[:, 0], chain.bends[i])
         leave_s = self._leg_s(chain.runs, j + 1, leaving, tos[j + 1 : j + 2], chain.bends[j + 1])
@@ -224,6 +274,19 @@ class _Legs:
         poses, legs_s = chain.poses.copy(), chain.legs_s.copy()
         poses[i : j + 1], legs_s[i], legs_s[j + 1] = blocks[row], arrive_s[row], leave_s[row]
         return replace(chain, poses=poses, legs_s=legs_s)
+
+    def first_place(
+        self, runs: np.ndarray, k: int, poses: Array, before: Array, after: Array, bends: tuple[Array, Array]
+    ) -> Array | None:
+        """(3,) of poses (n, 3) of run k the clear one whose legs from (1, 3) and to (1, 3), with bends, take least."""
+        leaving = run_ends(self.space, np.full(len(poses), runs[k]), poses)
+        legs_s = self._leg_s(runs, k, before, poses, bends[0]) + self._leg_s(runs, k + 1, leaving, after, bends[1])
+        legs_m = [np.hypot(*(b - a)[:, :2].T) for a, b in ((before, poses), (leaving, after))]
+        legs_s[(legs_m[0] < self._least_m(runs, k)) | (legs_m[1] < self._least_m(runs, k + 1))] = np.inf
+        order = np.argsort(np.round(legs_s, EQUAL), kind="stable")
+        ends = [*before[:, :2], *bends[0]][-1], [*bends[1], *after[:, :2]][0]
+        row = self._first_clear(runs[k : k + 1], poses[:, None], order[np.isfinite(legs_s[order])], *ends)
+        return None if row is None else poses[row]
 
     def _first_clear(
         self, runs: np.ndarray, blocks: Array, rows: np.ndarray, before: Array, after: Array
@@ -299,7 +362,7 @@ class _Legs:
         headings = chain.poses[i : j + 1, 2] + moves[:, 2:]
         return np.concatenate([firsts[:, None] + turned + drift, headings[..., None]], axis=-1)
 
-    def _ends(self, runs: np.ndarray, poses: Array) -> tuple[Array, Array]:
+    def ends(self, runs: np.ndarray, poses: Array) -> tuple[Array, Array]:
         """(n + 1, 3) where legs begin, and where they end."""
         return np.vstack([self.departure.pose, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
 
