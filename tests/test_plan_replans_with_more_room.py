@@ -17,7 +17,7 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, solve
+from expdesign.plan import PlanSettings, drafts, solve
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.values import PlanProblem
 from expdesign.simulation import Environment
@@ -143,6 +143,7 @@ def test_where_too_many_trials_are_aborted_their_run_gets_more_room_once(monkeyp
         aborted[worst, :10] = True
         return replace(risk, aborted=risks.pop(0), reasons=("somewhere",)), replace(trials, aborted=aborted)
 
+    monkeypatch.setattr(drafts, "sail_all", sailed)
     monkeypatch.setattr(solve, "sail_all", sailed)
     monkeypatch.setattr(solve, "drawn_risk", drawn)
     monkeypatch.setattr(solve, "_plan", lambda problem, sailed, **rest: SimpleNamespace(**rest))
