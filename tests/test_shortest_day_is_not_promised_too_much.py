@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from expdesign.errors import NoAnswer
+from expdesign.progress import silent
 from expdesign.shortest_day import alternate
-from expdesign.shortest_day.alternate import PROMISED, _Foreseen, _Search
+from expdesign.shortest_day.alternate import PROMISED, ROUNDS, _Foreseen, _Search
 from expdesign.shortest_day.cheapest import Choice
+from expdesign.shortest_day.drafting import Drafting
 
 PRICES = None
 
@@ -58,11 +60,37 @@ def test_runs_that_come_nearest_are_tried_where_the_limits_allow_no_more(monkeyp
         search([], monkeypatch).untried(PRICES, [], [])
 
 
-def test_no_day_is_drafted_for_a_hundredth_of_its_time(monkeypatch):
+def test_no_day_is_drafted_for_what_promises_are_wrong_by(monkeypatch):
     tried = [Choice(repeats=(9,), cost_s=1.0, bound_s=1.0)]
-    for expected_s, wanted in ((995.0, None), (980.0, (1,))):
+    for expected_s, wanted in ((975.0, None), (960.0, (1,))):
         found = search([[foreseen(1, expected_s, 0.2)]], monkeypatch).untried(PRICES, [day(1000.0, 0.01)], tried)
         assert (None if found is None else found.repeats) == wanted
+
+
+def test_no_runs_are_drafted_twice(monkeypatch):
+    offers = [[foreseen(1, 900.0, 0.2), foreseen(0, 800.0, 0.2)], [foreseen(2, 950.0, 0.2), foreseen(1, 900.0, 0.2)]]
+    tried = [Choice(repeats=(1,), cost_s=1.0, bound_s=1.0)]
+    known = day(1100.0, -0.5)  # of the runs (0,)
+    assert search(offers, monkeypatch).untried(PRICES, [known], tried).repeats == (2,)
+
+
+@pytest.mark.parametrize(
+    ("margins", "fullest", "drafted"),
+    [
+        ((0.1, 0.1, 0.1), False, 2),
+        ((-0.1, 0.1, -0.1, 0.1, 0.1), False, 4),
+        ((-0.1,) * 6, False, ROUNDS),
+        ((0.1,) * 6, True, ROUNDS),  # the fullest day is no day that reaches an accuracy
+    ],
+)
+def test_two_days_that_reach_the_accuracy_are_enough(monkeypatch, margins, fullest, drafted):
+    monkeypatch.setattr(alternate, "first_prices", lambda _: PRICES)
+    monkeypatch.setattr(_Search, "prices", lambda self, days: PRICES)
+    monkeypatch.setattr(Drafting, "with_another", lambda self, days, *_: [*days, day(1000.0, margins[len(days)])])
+    problem = SimpleNamespace(settings=SimpleNamespace(draft=False))
+    found = _Search(problem=problem, accuracy=None, added=(), fullest=fullest)
+    days, *_ = found.rounds(lambda *_: Choice(repeats=(1,), cost_s=1.0, bound_s=1.0), silent)
+    assert len(days) == drafted
 
 
 def test_what_is_foreseen_is_the_average_of_what_the_nearest_days_promise(monkeypatch):

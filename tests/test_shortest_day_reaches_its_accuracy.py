@@ -11,9 +11,7 @@ import pytest
 from expdesign import workflows
 from expdesign.information import regressor_rows
 from expdesign.memory import VARIABLE
-from expdesign.plan.solve import draft_trial
 from expdesign.scenario import load_scenario
-from expdesign.shortest_day import drafting
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, delivered
 from outside_check import columns
@@ -27,19 +25,12 @@ def day(made_once):
     """Folder of the day, and its scenario file with the runs of all drafts."""
 
     def run(folder):
-        scenario, drafted = copied(folder.with_name("day-scenario"), "story", {"total_s = 720.0": ASKED}), []
-
-        def once(problem, **options):
-            drafted.append([int(number) for number in problem.design.repeats])
-            return draft_trial(problem, **options)
-
-        cache = patch.dict(os.environ, {VARIABLE: str(folder.with_name("day-cache"))})
-        with cache, patch.object(drafting, "draft_trial", once):
+        scenario = copied(folder.with_name("day-scenario"), "story", {"total_s = 720.0": ASKED})
+        with patch.dict(os.environ, {VARIABLE: str(folder.with_name("day-cache"))}):
             workflows.run(scenario, folder, seed=1)
-        return str(scenario), drafted
+        return str(scenario)
 
-    folder, (scenario, drafted) = made_once("shortest-day", run)
-    return folder, scenario, drafted
+    return made_once("shortest-day", run)
 
 
 STEP_MPS = 1e-3  # of differences by the current
@@ -74,7 +65,7 @@ def log_det_beside_current(vessel, motion, commands, parameters):
 
 @pytest.mark.thorough
 def test_the_track_holds_what_was_asked_for(day):
-    folder, scenario, _ = day
+    folder, scenario = day
     case = load_scenario(Path(scenario))
     durations, found = (
         json.loads((folder / name).read_text(encoding="utf-8")) for name in ("durations.json", "day.json")
@@ -99,7 +90,7 @@ def test_the_track_holds_what_was_asked_for(day):
 
 
 def test_the_day_is_the_shortest_that_was_tried_and_reached_it(day):
-    folder, *_ = day
+    folder, _ = day
     found = json.loads((folder / "day.json").read_text(encoding="utf-8"))
     plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
     best = min((item for item in found["tried"] if item["information"] >= 1.0), key=lambda item: item["expected_s"])
@@ -109,7 +100,7 @@ def test_the_day_is_the_shortest_that_was_tried_and_reached_it(day):
 
 
 def test_no_day_found_is_shorter_than_the_bound(day):
-    folder, *_ = day
+    folder, _ = day
     found = json.loads((folder / "day.json").read_text(encoding="utf-8"))
     bound = found["bound"]
     assert found["day_bound_s"] == max(bound["information_s"], bound["way_s"])
@@ -121,7 +112,7 @@ def test_no_day_found_is_shorter_than_the_bound(day):
 
 
 def test_files_and_report_say_where_the_minutes_go(day):
-    folder, *_ = day
+    folder, _ = day
     found = json.loads((folder / "day.json").read_text(encoding="utf-8"))
     parts, page = found["goes_to"], (folder / "report.html").read_text(encoding="utf-8")
     assert sum(parts.values()) == pytest.approx(found["day_s"])
@@ -134,14 +125,9 @@ def test_files_and_report_say_where_the_minutes_go(day):
     assert 'id="pareto-' in page
 
 
-def test_no_runs_are_drafted_twice(day):
-    *_, drafted = day
-    assert len(drafted) == len(set(map(tuple, drafted))) > 1
-
-
 @pytest.mark.slow
 def test_two_processes_find_the_same_day(day, tmp_path):
-    folder, scenario, _ = day
+    folder, scenario = day
     workflows.run(Path(scenario), tmp_path, seed=1, jobs=2, cache=False)
     for name in ("plan.json", "day.json", "track.csv"):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
@@ -150,7 +136,7 @@ def test_two_processes_find_the_same_day(day, tmp_path):
 @pytest.mark.thorough
 @pytest.mark.usefixtures("undrawn_here")
 def test_a_draft_is_one_day_of_a_smaller_search_with_what_it_tells(day, tmp_path):
-    folder, scenario, _ = day
+    folder, scenario = day
     with patch.dict(os.environ, {VARIABLE: str(folder.with_name("day-cache"))}):
         workflows.run(Path(scenario), tmp_path, draft=True, seed=1)
     found = json.loads((tmp_path / "day.json").read_text("utf-8"))

@@ -28,7 +28,7 @@ from expdesign.shortest_day.values import DayBound, DayParts, DayTried, Shortest
 from expdesign.values import Array
 
 ROUNDS = 5  # most days that are planned in search of the shortest
-ENOUGH = 2  # days planned, after which one that reaches the accuracy is enough
+ENOUGH = 2  # days planned that reach the accuracy, or are made to, after which the shortest is taken
 
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
@@ -36,7 +36,7 @@ LEVEL_STEP, LEVEL_STEPS = 0.05, 10
 # margin that the nearest days have to promise of runs on average while no day reaches the accuracy; spare runs are left
 # out afterwards
 PROMISED = 0.1
-LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
+LEAST_SAVING = 0.03  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
 
@@ -172,10 +172,12 @@ class _Search:
         *told, last = in_phases(never_falling(progress), *np.ones(count + 1))
         rounds = [of_part(one, f"day {number} of at most {count}") for number, one in enumerate(told, start=1)]
         refused = NoPlan("no day was planned")
-        while rounds and (choice := choose(prices, days, choices)) is not None:
+        enough = np.inf if self.fullest else ENOUGH
+        while rounds and enough and (choice := choose(prices, days, choices)) is not None:
             choices.append(choice)
             try:
-                days = self.drafting.with_another(days, choice.repeats, rounds[0])
+                before, days = len(days), self.drafting.with_another(days, choice.repeats, rounds[0])
+                enough -= any(day.margin >= 0 for day in days[before:])
                 prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
@@ -206,15 +208,12 @@ class _Search:
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy, by some margin; else those that come nearest.
 
-        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included, or that
-        is one of enough days tried.
+        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
-        if np.isfinite(reached_s) and len(tried) >= ENOUGH:
-            return None
         least = 0.0 if np.isfinite(reached_s) else PROMISED
         known, short = {other.repeats for other in tried} | {day.repeats for day in days}, list[_Foreseen]()
         for step in range(LEVEL_STEPS):

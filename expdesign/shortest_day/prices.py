@@ -22,7 +22,7 @@ from expdesign.plan.values import PlanProblem
 from expdesign.signals import Trajectory
 from expdesign.values import Array, sealed
 
-FIRST_SHARE = 0.4  # information from runs in the first day, as a share of what is needed; legs tell the rest
+FIRST_SHARE = 0.55  # information from runs in the first day, as a share of what is needed; legs tell the rest
 COURSES = 4  # on which runs are taken to be sailed
 # standard deviation of these about the straight line, before a day has been planned: two courses, so far to each side,
 # average smooth functions as any even spread does, up to the third order
