@@ -14,6 +14,7 @@ from expdesign.plan.solve import draft_trial
 from expdesign.plan.values import Leg, Placement, PlanProblem
 from expdesign.progress import silent
 from expdesign.shortest_day.drafting import Drafting
+from expdesign.shortest_day.more_runs import with_more
 from expdesign.shortest_day.prices import DraftedDay
 from expdesign.simulation import CALM
 from plan_case import acceleration, area, ship
@@ -192,3 +193,53 @@ def test_spare_runs_go_at_once_and_all_days_are_as_late_as_the_one_that_trials_a
     assert len(drawn) == 1
     late_s = [0.1 * days[0].day_s / 8 * sum(day.repeats) for day in days]
     assert [day.expected_s - day.day_s for day in days] == pytest.approx(late_s)
+
+
+def test_days_near_one_that_no_drawn_trial_ends_are_not_taken_to_be_in_time(monkeypatch):
+    """Nor is another day taken to be as late: trials are drawn of it."""
+    drafting = Drafting(
+        problem=SimpleNamespace(design=of_runs(1, 2, 1), settings=SimpleNamespace(draft=False)),
+        accuracy=SimpleNamespace(margin=lambda M: float(np.log(M[0, 0] / NEEDED))),
+    )
+    late_s = iter([np.inf, 1.0])
+    module = "expdesign.shortest_day.drafting"
+    monkeypatch.setattr(f"{module}.find_legs", lambda *_: None)
+    monkeypatch.setattr(f"{module}.redrafted", lambda _, draft, places: [one.primitive for one in places])
+    monkeypatch.setattr(f"{module}.draft_trial", lambda *_, **__: ["much", "little", "less", "little"])
+    monkeypatch.setattr(
+        f"{module}.drawn_lateness_s", lambda problem, water, sailed: np.full(len(sailed.legs), next(late_s))
+    )
+    monkeypatch.setattr(f"{module}.replace", lambda problem, **_: problem)
+    monkeypatch.setattr(Drafting, "_of", lambda self, repeats: self.problem)
+    monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, names: day_of(names))
+    monkeypatch.setattr(f"{module}.with_more", lambda *_: None)
+    days = drafting.with_another([], (1, 2, 1), silent)
+    assert [day.expected_s for day in days] == [np.inf]
+    days = drafting.with_another(days, (1, 2, 1), silent)
+    assert [sum(day.repeats) for day in days] == [4, 4, 2]
+    assert [day.drawn for day in days] == [True, True, False]
+    assert np.isfinite([day.expected_s for day in days[1:]]).all()
+
+
+@pytest.mark.parametrize(
+    ("most_s", "put_in"), [({}, "much"), ({"much": 119.0}, "little"), ({"much": 119.0, "little": 61.0}, None)]
+)
+def test_runs_that_limits_allow_no_more_of_make_no_day_good_and_leave_others_their_places(monkeypatch, most_s, put_in):
+    """Of two manoeuvres only the better one is tried, of those that may be run once more."""
+    monkeypatch.setattr("expdesign.shortest_day.more_runs.KINDS", 1)
+    monkeypatch.setattr(
+        "expdesign.shortest_day.more_runs.another_in_leg",
+        lambda problem, draft, leg, run: (
+            Placement(primitive=draft.room.space.footprints[run].name, pose=np.zeros(3)),
+            70.0,
+        ),
+    )
+    design = of_runs(1, 1, 0)
+    design.problem.constraints.most_s = most_s
+    accuracy = SimpleNamespace(margin=lambda M: float(np.log(M[0, 0] / NEEDED)))
+    grown = with_more(SimpleNamespace(design=design), accuracy, day_of(["much", "little"], needed=7.0), 0.0)
+    if put_in is None:
+        assert grown is None
+    else:
+        assert grown is not None
+        assert sorted(one.primitive for one in grown.placements) == sorted(["much", "little", put_in])

@@ -47,13 +47,16 @@ def legs_ahead(
     """The legs of tasks, in order; those known are not sought again, and those found become known."""
     if known is None:
         return in_order(_found, (planner, water), ((task,) for task in tasks))
-    listed = {_place(task): task for task in tasks}
-    fresh = {place: task for place, task in listed.items() if place not in known}
-    if len(fresh) == 1:  # found here before another process has the water
-        remember(known, leg_found(planner, water, *fresh.values()))
+    places, sought = [], dict[tuple[bytes, ...], LegTask]()
+    for task in tasks:  # the same place may come twice
+        places.append(place := _place(task))
+        if place not in known:
+            sought[place] = task
+    if len(sought) == 1:  # found here before another process has the water
+        remember(known, leg_found(planner, water, *sought.values()))
     else:
-        known |= zip(fresh, in_order(_found, (planner, water), ((task,) for task in fresh.values())), strict=True)
-    return (known[place] for place in listed)
+        known |= zip(sought, in_order(_found, (planner, water), ((task,) for task in sought.values())), strict=True)
+    return (known[place] for place in places)
 
 
 def remember(known: KnownLegs, ahead: LegAhead) -> None:

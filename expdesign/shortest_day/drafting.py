@@ -57,10 +57,10 @@ class Drafting:
         if late_run_s is None:
             problem = replace(self._of(repeats), area=day.draft.area)
             day = day.late(drawn_lateness_s(problem, day.draft.water, day.draft.sailed))
-            late_run_s = _late_run_s([day])
         else:
             day = day.taken_late(late_run_s)
-        near = day if self.fullest else self.shortest_near(day, late_run_s or 0.0)
+        lost = not np.isfinite(day.expected_s)  # no drawn trial ends at the goal: those near it are as bad
+        near = day if self.fullest or lost else self.shortest_near(day, day.late_run_s)
         return [*days, day, *([] if near is day else [near])]
 
     def shortest_near(self, day: DraftedDay, late_run_s: float) -> DraftedDay:

@@ -60,8 +60,9 @@ def with_more(problem: PlanProblem, accuracy: Accuracy, day: DraftedDay, late_ru
         day: that falls short.
         late_run_s: by which drawn trials are late for each run [s].
     """
-    told, names = _told_by_run(day), problem.design.problem.names
+    names = problem.design.problem.names
     left = dict(zip(names, (most_runs(problem) - np.array(day.repeats)).tolist(), strict=True))
+    told = {name: one for name, one in _told_by_run(day).items() if left[name] >= 1}
     places = _places(problem, accuracy, day, told, late_run_s)
     whole, spare = day.whole, day.margin - accuracy.margin(day.whole)
     margin, more_s, put = day.margin, 0.0, dict[int, Placement]()
@@ -97,16 +98,16 @@ def _told_by_run(day: DraftedDay) -> dict[str, Array]:
 def _places(
     problem: PlanProblem, accuracy: Accuracy, day: DraftedDay, told: dict[str, Array], late_run_s: float
 ) -> list[_Place]:
-    """Places of the manoeuvres that tell most for their time, in the longest legs."""
+    """Places of the manoeuvres that tell most for their time, of those told of, in the longest legs."""
     draft, legs, found = day.draft, day.draft.sailed.legs, list[_Place]()
-    footprints = draft.room.space.footprints
     runs = np.array([leg.kind == "primitive" for leg in legs])
     legs_s = np.bincount(np.cumsum(runs), weights=np.where(runs, 0.0, draft.sailed.legs_s), minlength=runs.sum() + 1)
-    alone, worth = accuracy.margin(day.whole), list[float]()
-    for item in footprints:
-        cost_s = max(item.duration_s - item.displacement_m / draft.transit_mps + late_run_s, LEAST_LEG_S)
-        worth.append((accuracy.margin(day.whole + told[item.name]) - alone) / cost_s)
-    for run in np.argsort(-np.array(worth), kind="stable").tolist()[:KINDS]:
+    alone, worth = accuracy.margin(day.whole), dict[int, float]()
+    for run, item in enumerate(draft.room.space.footprints):
+        if item.name in told:
+            cost_s = max(item.duration_s - item.displacement_m / draft.transit_mps + late_run_s, LEAST_LEG_S)
+            worth[run] = (accuracy.margin(day.whole + told[item.name]) - alone) / cost_s
+    for run in sorted(worth, key=lambda run: -worth[run])[:KINDS]:
         for leg in np.argsort(-legs_s, kind="stable").tolist()[:LEGS]:
             if another := another_in_leg(problem, draft, leg, run):
                 found.append(_Place(leg=leg, placement=another[0], more_s=another[1] + late_run_s))

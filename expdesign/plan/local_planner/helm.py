@@ -7,8 +7,8 @@ curve, and goes straight for the last hull length before a run.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -48,7 +48,7 @@ from expdesign.plan.local_planner.protocol import (
     TransitionTrials,
 )
 from expdesign.simulation import CALM
-from expdesign.values import Array, sealed
+from expdesign.values import Array, readonly, sealed
 
 # what a metre costs that a helm-steered leg is too short by, in metres at transit speed: the ship goes back for it,
 # slowly
@@ -182,14 +182,14 @@ def _table(speed: Array, step_s: float, top_mps: float) -> Array:
     return np.column_stack([most, path_m, step_s * np.arange(count)])
 
 
-@sealed(recoveries="q 4")
+@dataclass(frozen=True, kw_only=True, eq=False)
 class HelmPlanner:
     """Legs recover from the run before, turn on Dubins curves, and end with a straight run-up."""
 
     ship: HelmShip  # speeds, turns, stopping
-    # (q, 4) displacement by which the ship recovers from each run before its first turn: ahead m, to starboard m,
-    # course from the heading at the run's end rad, time s
-    recoveries: Array
+    # by a run's name, as a space may have fewer runs: (4,) displacement by which the ship recovers from it before its
+    # first turn: ahead m, to starboard m, course from the heading at the run's end rad, time s
+    recoveries: Mapping[str, Array]
 
     @cached_property
     def times(self) -> HelmTimes:
@@ -242,7 +242,8 @@ class HelmPlanner:
         """(n,) whether arcs lead to the run-ups of runs, and on from where the ship has recovered from them."""
         back_m = np.array([-self.times.straight_m(run.entry_mps) for run in space.footprints])[primitive]
         found = ways_on(space, moved(start, back_m[:, None] * (1.0, 0.0, 0.0)), backwards=True)
-        found[found] = ways_on(space, moved(end[found], self.recoveries[primitive[found], :3]))
+        steps = np.array([self.recoveries[run.name][:3] for run in space.footprints])
+        found[found] = ways_on(space, moved(end[found], steps[primitive[found]]))
         return found
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
@@ -296,16 +297,16 @@ class HelmPlanner:
     def _recovery(self, space: SearchSpace, last: int) -> Array:
         """(4,) recovery from a run, or from the start (-1): one hull length straight ahead."""
         if last >= 0:
-            return np.asarray(self.recoveries[last])
+            return self.recoveries[space.footprints[last].name]
         return np.array([space.hull_m, 0.0, 0.0, space.hull_m / self.ship.transit_speed_mps])
 
 
-def recoveries(ship: HelmShip, water: LegWater, runs: Sequence[Primitive]) -> Array:
-    """(q, 4) displacement by which the ship recovers from each run, in calm water."""
+def recoveries(ship: HelmShip, water: LegWater, runs: Sequence[Primitive]) -> dict[str, Array]:
+    """(4,) displacement by which the ship recovers from each run, by its name, in calm water."""
     calm = replace(water, environment=CALM)
     scales = {"sample_time_s": water.vessel.sample_time_s, "hull_m": water.vessel.length_m}
-    found = []
+    found = dict[str, Array]()
     for run in runs:
         checked = recover(last_state(run.trajectory), calm.remembered(run.commands.values), calm, ship)
-        found.append(displaced(checked, ship, **scales))
-    return np.array(found).reshape(-1, 4)
+        found[run.name] = readonly(displaced(checked, ship, **scales))
+    return found
