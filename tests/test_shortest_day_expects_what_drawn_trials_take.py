@@ -66,6 +66,12 @@ def test_a_run_costs_what_trials_lose_on_the_leg_to_it(drafted):
     assert after - before == pytest.approx(100.0 / 2)  # over both runs
 
 
+def test_a_day_that_no_drawn_trial_ends_tells_what_runs_cost_as_planned(drafted):
+    count = len(drafted.draft.sailed.legs)
+    planned, lost = (_legs_s(("go",), [drafted.late(np.full(count, late))], np.array([45.0])) for late in (0.0, np.inf))
+    assert lost == pytest.approx(planned)
+
+
 def test_legs_are_faster_than_usual_only_where_no_speed_is_stated():
     case = load_scenario(SCENARIOS / "story.toml")
     usual = capability(case.vessel, case.plan)

@@ -67,6 +67,14 @@ def test_no_day_is_drafted_for_what_promises_are_wrong_by(monkeypatch):
         assert (None if found is None else found.repeats) == wanted
 
 
+def test_a_day_that_no_drawn_trial_ends_is_no_reason_to_draft_no_other(monkeypatch):
+    tried = [Choice(repeats=(9,), cost_s=1.0, bound_s=1.0)]
+    for expected_s in (1000.0, np.inf):  # another near it is expected to be as bad
+        found = search([[foreseen(1, expected_s, 0.2)]], monkeypatch).untried(PRICES, [day(np.inf, 0.01)], tried)
+        assert found is not None
+        assert found.repeats == (1,)
+
+
 def test_no_runs_are_drafted_twice(monkeypatch):
     offers = [[foreseen(1, 900.0, 0.2), foreseen(0, 800.0, 0.2)], [foreseen(2, 950.0, 0.2), foreseen(1, 900.0, 0.2)]]
     tried = [Choice(repeats=(1,), cost_s=1.0, bound_s=1.0)]
@@ -78,6 +86,7 @@ def test_no_runs_are_drafted_twice(monkeypatch):
     ("margins", "fullest", "drafted"),
     [
         ((0.1, 0.1, 0.1), False, 2),
+        ((0.1, np.inf, np.inf, 0.1, 0.1), False, 4),  # a day that no drawn trial ends is not good enough
         ((-0.1, 0.1, -0.1, 0.1, 0.1), False, 4),
         ((-0.1,) * 6, False, ROUNDS),
         ((0.1,) * 6, True, ROUNDS),  # the fullest day is no day that reaches an accuracy
@@ -86,7 +95,8 @@ def test_no_runs_are_drafted_twice(monkeypatch):
 def test_two_days_that_reach_the_accuracy_are_enough(monkeypatch, margins, fullest, drafted):
     monkeypatch.setattr(alternate, "first_prices", lambda _: PRICES)
     monkeypatch.setattr(_Search, "prices", lambda self, days: PRICES)
-    monkeypatch.setattr(Drafting, "with_another", lambda self, days, *_: [*days, day(1000.0, margins[len(days)])])
+    drafts = [day(1000.0, margin) if margin < np.inf else day(np.inf, 0.1) for margin in margins]
+    monkeypatch.setattr(Drafting, "with_another", lambda self, days, *_: [*days, drafts[len(days)]])
     problem = SimpleNamespace(settings=SimpleNamespace(draft=False))
     found = _Search(problem=problem, accuracy=None, added=(), fullest=fullest)
     days, *_ = found.rounds(lambda *_: Choice(repeats=(1,), cost_s=1.0, bound_s=1.0), silent)

@@ -177,7 +177,7 @@ class _Search:
             choices.append(choice)
             try:
                 before, days = len(days), self.drafting.with_another(days, choice.repeats, rounds[0])
-                enough -= any(day.margin >= 0 for day in days[before:])
+                enough -= any(day.margin >= 0 and np.isfinite(day.expected_s) for day in days[before:])
                 prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
@@ -226,7 +226,8 @@ class _Search:
             fresh = [one for one in found if one.choice.repeats not in known]
             if enough := [one for one in fresh if one.margin >= least]:
                 best = min(enough, key=lambda one: one.expected_s)
-                return best.choice if best.expected_s < (1 - LEAST_SAVING) * reached_s else None
+                shorter = np.isinf(reached_s) or best.expected_s < (1 - LEAST_SAVING) * reached_s
+                return best.choice if shorter else None
             short += fresh
         if np.isfinite(reached_s) or not short:
             return None

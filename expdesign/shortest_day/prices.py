@@ -269,12 +269,14 @@ def learnt_prices(problem: PlanProblem, days: Sequence[DraftedDay]) -> Prices:
 def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) -> Array:
     """(q,) repositioning for each run, beyond the way that it and its leg make good, as drawn trials take it [s].
 
-    By the legs that led to it so far, and the average leg, which counts as `AVERAGE_LEGS` of them.
+    By the legs that led to it so far, and the average leg, which counts as `AVERAGE_LEGS` of them. Of a day that no
+    drawn trial ended, as planned.
     """
     beyond_s, into = list[float](), list[int]()
     for day in days:
         draft, sailed = day.draft, day.draft.sailed
-        runs, beyond = [leg.kind == "primitive" for leg in sailed.legs], lost_s(draft) + draft.late_s
+        runs, late_s = [leg.kind == "primitive" for leg in sailed.legs], draft.late_s
+        beyond = lost_s(draft) + np.where(np.isfinite(late_s), late_s, 0.0)
         for place in np.flatnonzero(runs).tolist():
             run = names.index(sailed.legs[place].name)
             first = place - 1 if place and not runs[place - 1] else place
