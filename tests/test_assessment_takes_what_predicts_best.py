@@ -10,6 +10,7 @@ import pytest
 from expdesign.assessment import EstimateOptions, assess
 from expdesign.assessment.ahead import TRIAL_LENGTHS, Ahead, by_run, missed
 from expdesign.assessment.held_out import (
+    FAR_WORSE,
     Candidate,
     Found,
     HeldOut,
@@ -21,6 +22,7 @@ from expdesign.assessment.held_out import (
     stay_bounded,
 )
 from expdesign.cli import main
+from expdesign.errors import NotInformative
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
 from expdesign.estimation.output_error import minimise
@@ -281,6 +283,54 @@ def test_what_makes_the_deciding_error_least_goes_first_until_runs_tell_otherwis
     assert ("do not tell from chance" in reason(found, first.label, ())) == (best == "oe")
     far = [found[0], of_runs("oe", 30.0, 0.21 * size)]
     assert ranked(far) == [0, 1]
+
+
+@pytest.mark.parametrize("own", [(True, True), (True, False), (False, True), (False, False)])
+@pytest.mark.parametrize("fault", ["explains", "bounded"])
+@pytest.mark.parametrize(
+    ("times", "first"),
+    [
+        ((0.7, 0.7, 0.7), "oe"),  # better in every run
+        ((1.5, 1.5, 1.5), "ls"),  # worse in every run
+        ((1.21, 1.21, 2.65), "oe"),  # lost by one of three: the Mariner's circles tell nothing of her zig-zag
+        ((1.2, 1.2, 8.0), "ls"),  # by so much that the mean is over twice as large
+        ((1.5, 1.4, 1.6, 1.5, 1.4, 1.6), "ls"),  # worse for certain
+    ],
+)
+def test_no_unsound_estimate_goes_first_and_few_runs_are_no_reason_against_output_error(
+    times: tuple[float, ...], first: str, fault: str, own: tuple[bool, bool]
+) -> None:
+    """Output error's errors are so many times those of least squares, whichever of them has a fault, at every size."""
+    for size in (0.001, 0.05, 0.4):
+        found = [of_runs("oe", 30.0, size * np.array(times)), of_runs("ls", None, size * np.ones(len(times)))]
+        found = [replace(item, **{fault: fine}) for item, fine in zip(found, own, strict=True)]
+        least = "oe" if found[0].share < found[1].share else "ls"  # of two with faults
+        expected = {(True, True): first, (True, False): "oe", (False, True): "ls", (False, False): least}[own]
+        assert found[ranked(found)[0]].method.name == expected
+        assert found[::-1][ranked(found[::-1])[0]].method.name == expected  # in whatever order they are asked for
+
+
+@pytest.mark.parametrize("lacking", [None, 0, 1, 2])
+@pytest.mark.parametrize(("wrong", "first"), [(4.0, "ls"), (2.5, "oe")])
+def test_a_run_that_a_method_cannot_do_without_does_not_make_its_losses_look_like_chance(
+    lacking: int | None, wrong: float, first: str
+) -> None:
+    """Worse in every run that it predicts is worse for certain, whether or not the others always give an estimate."""
+    ship, record = yaw_ship(), Record(batches=tuple(yaw_run(seed) for seed in range(3)))
+    own, near = (Found(model=ship.model.with_parameters({"N_r": DECAY * factor})) for factor in (wrong, 2.5))
+
+    def again(rest: Record) -> Found:
+        if lacking is not None and f"run {lacking}" not in {batch.name for batch in rest.batches}:
+            raise NotInformative("the rest tells too little")
+        return own
+
+    candidates = [
+        Candidate(method=method_named("oe"), horizon_s=30.0, found=own, wind=False, again=again),
+        Candidate(method=method_named("ls"), horizon_s=None, found=near, wind=False, again=lambda _: near),
+    ]
+    found = held_out(record, candidates, ship=ship, seen_as=lambda own: own, integration=RK4)
+    assert found[0].share < FAR_WORSE * found[1].share  # a factor does not decide
+    assert found[ranked(found)[0]].method.name == first
 
 
 def test_pieces_of_one_run_are_no_more_runs() -> None:

@@ -11,7 +11,8 @@ instrumental variables, then output error, then least squares.
 
 Few runs tell methods apart badly: what is left of them is half of the data or less, and they differ among themselves.
 So output error over `AHEAD_S`, which makes the very error least that decides, goes first unless another one is
-better for certain: by an interval of 95 % over the runs, or by a factor of `FAR_WORSE`.
+better for certain: by an interval of 95 % over the runs, or by a factor of `FAR_WORSE`. A run that a method
+cannot do without costs it an error of 1, but is not in the interval: the loss would make the others look like chance.
 
 Predictions of what was recorded do not show what a model does beyond it. A hull dissipates: driven no harder than in
 the data, but with its rudders hard over, no point of it gets many times as fast as in the data. A model in which one
@@ -67,7 +68,8 @@ class HeldOut:
     # whether the estimate predicts the data it is from at most `FAR_WORSE` times as badly as others like it predicted
     # what they had not seen
     explains: bool = True
-    # (runs,) means over outputs of the logarithms of each run's errors, the same runs of all methods; or not known
+    # (runs,) means over outputs of the logarithms of each run's errors, the same runs of all methods, nan where the
+    # others give the method no estimate; or not known
     of_runs: Array | None = None
     missed: Missed | None = None  # what predictions as long as a standard trial miss
 
@@ -294,7 +296,7 @@ def held_out(
             unseen=unseen,
             bounded=own,
             explains=_joined(typical(seen)) <= FAR_WORSE * _joined(typical(shares)),
-            of_runs=by_run(shares, names),
+            of_runs=by_run(np.where([[row[number] is None] for row in models], np.nan, shares), names),
             missed=missed_by(candidate, [row[number] for row in models]) if unseen else None,
         )
         for number, (candidate, shares, seen, own) in enumerate(zip(candidates, each, own_data, bounded, strict=True))
