@@ -60,9 +60,9 @@ def test_runs_that_come_nearest_are_tried_where_the_limits_allow_no_more(monkeyp
         search([], monkeypatch).untried(PRICES, [], [])
 
 
-def test_no_day_is_drafted_for_what_promises_are_wrong_by(monkeypatch):
+def test_no_day_is_drafted_for_a_hundredth_of_its_time(monkeypatch):
     tried = [Choice(repeats=(9,), cost_s=1.0, bound_s=1.0)]
-    for expected_s, wanted in ((975.0, None), (960.0, (1,))):
+    for expected_s, wanted in ((995.0, None), (980.0, (1,))):
         found = search([[foreseen(1, expected_s, 0.2)]], monkeypatch).untried(PRICES, [day(1000.0, 0.01)], tried)
         assert (None if found is None else found.repeats) == wanted
 

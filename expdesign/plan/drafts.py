@@ -16,7 +16,7 @@ from expdesign.plan.legs import LegWater
 from expdesign.plan.legs_ahead import KnownLegs
 from expdesign.plan.local_planner import Departure
 from expdesign.plan.sailing import know_legs, sail_all, sail_placed
-from expdesign.plan.search import with_another
+from expdesign.plan.search import measured_s, with_another
 from expdesign.plan.values import Placement, PlanProblem, SailedTrial, WorkBudget
 from expdesign.progress import Progress
 from expdesign.sea_area import SeaArea
@@ -96,7 +96,7 @@ def find_legs(problem: PlanProblem, draft: Draft, choices: Iterable[Sequence[Pla
 
 
 def another_in_leg(problem: PlanProblem, draft: Draft, leg: int, run: int) -> tuple[Placement, float] | None:
-    """Another run within a leg of a draft, and by how much longer the trial is with it, by the rule for legs [s].
+    """Another run within a leg of a draft, and by how much longer the trial is with it, without go-arounds [s].
 
     None where the leg has no room for it.
 
@@ -110,10 +110,13 @@ def another_in_leg(problem: PlanProblem, draft: Draft, leg: int, run: int) -> tu
     names = [item.name for item in space.footprints]
     runs, poses = [names.index(item.primitive) for item in placed], np.array([item.pose for item in placed])
     departure = Departure(pose=begin[:3], exit_mps=float(begin[3]), last=-1)
-    found = with_another(space, departure, runs, poses.reshape(-1, 3), leg=leg, run=run)
-    if found is None:
+    grown = with_another(space, departure, runs, poses.reshape(-1, 3), leg=leg, run=run)
+    if grown is None:
         return None
-    return Placement(primitive=names[run], pose=found.poses[leg]), found.seconds + space.footprints[run].duration_s
+    begun = replace(space, go_around=None)  # each run begins at the first attempt
+    more = [*runs[:leg], run, *runs[leg:]]
+    legs_s = measured_s(begun, more, grown, departure) - measured_s(begun, runs, poses.reshape(-1, 3), departure)
+    return Placement(primitive=names[run], pose=grown[leg]), legs_s + space.footprints[run].duration_s
 
 
 def _measured(

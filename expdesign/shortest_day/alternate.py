@@ -36,7 +36,7 @@ LEVEL_STEP, LEVEL_STEPS = 0.05, 10
 # margin that the nearest days have to promise of runs on average while no day reaches the accuracy; spare runs are left
 # out afterwards
 PROMISED = 0.1
-LEAST_SAVING = 0.03  # share of the shortest day that reaches the accuracy, for which another is drafted
+LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
 

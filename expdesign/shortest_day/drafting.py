@@ -83,11 +83,11 @@ class Drafting:
                 break
             first, *grown = grown
             short, other = short[NEARLY:], self._redrafted(first.day.draft, first.placements, late_run_s)
-            if other is not None and other.expected_s < most_s and other.margin >= 0:
+            if other is not None and other.margin < 0:
+                short.append(other)
+            elif other is not None and other.expected_s < most_s:
                 best, others = self.without_spare_runs(other, late_run_s)
                 short += others
-            elif other is not None:
-                short.append(other)
         return best
 
     def without_spare_runs(self, day: DraftedDay, late_run_s: float) -> tuple[DraftedDay, list[DraftedDay]]:

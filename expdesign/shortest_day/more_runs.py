@@ -48,7 +48,7 @@ def enough_s(day: DraftedDay, margin: float, more_s: float = 0.0) -> float:
         margin: of the accuracy.
         more_s: by which it is longer than this day [s].
     """
-    return day.expected_s + more_s + CHEAPER * -margin * (day.day_s - day.draft.direct_s)
+    return day.expected_s + more_s + CHEAPER * -margin * max(day.day_s - day.draft.direct_s, 0.0)
 
 
 def with_more(problem: PlanProblem, accuracy: Accuracy, day: DraftedDay, late_run_s: float) -> Grown | None:

@@ -189,8 +189,10 @@ def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, departure:
 
 def with_another(
     space: SearchSpace, departure: Departure, runs: Sequence[int], poses: Array, *, leg: int, run: int
-) -> Polished | None:
-    """The runs with another within a leg, where it suits the legs beside it best; None where that has no room for it.
+) -> Array | None:
+    """(n + 1, 3) where runs begin with another within a leg, where it suits the legs beside it best.
+
+    None where the leg has no room for it.
 
     It is tried along and beside the longest straight stretch of the leg, and then moved and turned while that makes
     legs shorter. The others stay where they are.
@@ -199,9 +201,6 @@ def with_another(
         space, departure, runs, poses: as of `polished`.
         leg: number of the leg; that of the last leads to the goal.
         run: index of the primitive.
-
-    Returns:
-        Poses of all runs, and by how much longer all legs are together.
     """
     legs, placed = _Legs(space=space, departure=departure), np.array(runs, dtype=int)
     froms, tos = legs.ends(placed, poses)
@@ -215,11 +214,12 @@ def with_another(
     pose = legs.first_place(grown, leg, beside, froms[leg : leg + 1], tos[leg : leg + 1], bends)
     if pose is None:
         return None
-    chain, moves = legs.measured(grown, np.insert(poses, leg, pose, axis=0)), 0
-    while moves < SWEEPS and (moved := legs.moved(chain, leg, leg)) is not chain:
-        chain, moves = moved, moves + 1
-    more_s = float(chain.legs_s.sum()) - float(legs.measured(placed, poses).legs_s.sum())
-    return Polished(poses=chain.poses, seconds=more_s, moves=moves)
+    chain = legs.measured(grown, np.insert(poses, leg, pose, axis=0))
+    for _ in range(SWEEPS):
+        before, chain = chain, legs.moved(chain, leg, leg)
+        if chain is before:
+            break
+    return chain.poses
 
 
 def _beside(space: SearchSpace, begin: Array, end: Array, run: int) -> Array:
