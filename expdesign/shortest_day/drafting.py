@@ -66,8 +66,11 @@ class Drafting:
     def shortest_near(self, day: DraftedDay, late_run_s: float) -> DraftedDay:
         """The shortest day found that reaches the accuracy with runs left out or put in; the day where none does.
 
-        Days that fall short, the day itself or those for want of a run left out, are made good by runs that cost less.
-        Each run brings the time by which drawn trials are late for one [s].
+        Days that fall short, the day itself or it without some run, get further runs that cost less.
+
+        Args:
+            day: to begin with, and what is returned where no day near it reaches the accuracy.
+            late_run_s: by which drawn trials are late for each run [s].
         """
         best, short = self.without_spare_runs(day, late_run_s) if day.margin >= 0 else (day, [day])
         grown = list[Grown]()

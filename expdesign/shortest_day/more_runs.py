@@ -41,7 +41,7 @@ class _Place:
 
 
 def enough_s(day: DraftedDay, margin: float, more_s: float = 0.0) -> float:
-    """About how long a day is with the runs that it lacks: information grows with the time that takes beyond the way.
+    """About how long a day is with the runs that it lacks, as information grows with the time spent beyond the way [s].
 
     Args:
         day: gives what information costs.
