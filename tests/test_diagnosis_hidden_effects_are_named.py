@@ -1,5 +1,7 @@
 """Effects hidden by an independent simulator are named, estimated and mended; clean data are called clean."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,7 @@ CASES = (
     ("barge", "gyro_bias", {}, {"gyro_bias": -0.004}, "yaw_rate_bias_radps", -0.004),
     ("barge", "sensor_delay", {}, {"late_v": 2.0}, "v_delay_s", 2.0),
     ("tug", "thruster_asymmetry", {"angle_offset": 0.06}, {}, "angle_offset_a_rad", 0.06),
-    ("coaster", "actuator_scale", {"rudder_scale": -0.1}, {}, "angle_factor_rudder", 0.9),
+    ("coaster", "actuator_scale", {"rudder_scale": -0.1}, {}, "input_factor_rudder", 0.9),
     ("coaster", "actuator_lag", {"lag_s": 5.0, "acts_on": 0b10}, {}, "lag_rudder_s", 5.0),
     ("barge", "missing_term:N_rrr", {"N_rrr": -60.0}, {}, "N_rrr", -60.0),
 )
@@ -71,6 +73,19 @@ def test_every_hidden_effect_is_named(case):
 def test_every_hidden_effect_is_named_by_uncertain_parameters(case):
     """Of three effects not: parameters uncertain by a tenth each leave one common factor of that size undecided."""
     check(case, seed=12, relative_std=0.1)
+
+
+@pytest.mark.parametrize(("factor", "relative_std"), [(0.5, 0.0), pytest.param(0.8, 0.1, marks=pytest.mark.thorough)])
+def test_one_engine_that_gives_a_share_of_its_recorded_speed_is_named(factor, relative_std):
+    """Orders of one thruster of two are recorded too large; a tenth of all thrust may be wrong besides."""
+    record = hidden_record("tug", seed=31, batches=3, samples=150, relative_std=relative_std)
+    shown = np.array([1.0, 1.0, 1.0 / factor, 1.0])
+    record = replace(record, batches=tuple(replace(one, inputs=one.inputs * shown) for one in record.batches))
+    (first,) = diagnose(vessel_of("tug", relative_std=relative_std), record, seed=0).findings
+    assert (first.cause, first.keys) == ("actuator_scale", ("scale:n2",))
+    (share,) = first.estimates
+    assert abs(share.value - factor) < 4 * share.std + 0.002 * factor
+    assert ("whether this one or the others" in first.explanation) == (relative_std > 0)
 
 
 SMALL, WHOLE = {"batches": 2, "samples": 80}, {"batches": 6, "samples": 300}

@@ -1,12 +1,16 @@
 """Simulations of the diagnosis, their derivatives, and the vessel files that are written from them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis.causes.actuators import ACTUATOR_SCALE
+from expdesign.diagnosis.causes.candidate import Situation
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.model import group_columns
 from expdesign.diagnosis.motion.equations_of_motion import propagated
 from expdesign.diagnosis.motion.inputs import exogenous_inputs
 from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
@@ -19,6 +23,9 @@ from expdesign.diagnosis.motion.simulation import (
 )
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
+from expdesign.scenario import load_vessel
+from expdesign.signals import Batch, Record
+from expdesign.vessel import stem
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
@@ -113,6 +120,7 @@ TOGETHER = (
     ("barge", {"asymmetry": 0.6, "change:time": 0.0, "change:gain": 0.3, "change:damping_r": -0.2}),
     ("barge", {"term:Y_abs_v_v": -0.05, "inertia:v": 0.3, "change:time": 0.0, "change:damping": 0.2}),
     ("coaster", {"scale:rudder": -0.1, "gain": 0.1, "inertia:r": 0.2}),
+    ("tug", {"scale:n1": -0.4, "scale:n2": 0.1, "asymmetry": 0.4, "gain": 0.1, "lag:n": 2.0, "offset:a1": 0.05}),
     ("coaster", SENSED | {"asymmetry": 2e-4, "inertia:r": 0.5, "gain": 0.1}),
     ("coaster", {"gain:propeller": 0.2, "gain": 0.1, "inertia:u": 0.2, "term:X_unn": -3e-4, "theta:X_nn": 1e-4}),
 )
@@ -131,6 +139,39 @@ def test_an_extended_vessel_simulates_as_the_extended_model(ship, effects):
     one = simulate_windows(extended, windows, start).predicted
     other = simulate_windows(extended_model(again, record), windows, start).predicted
     assert np.abs(one - other).max() < 1e-9
+
+
+SHIPS = sorted(Path(__file__).parents[1].glob("scenarios/vessels/*.toml"))
+TEMPLATES = sorted(Path(__file__).parents[1].glob("expdesign/templates/*/vessel.toml"))
+
+
+@pytest.mark.parametrize("path", [*SHIPS, *TEMPLATES], ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_each_rudder_and_each_of_several_engines_may_have_a_scale(path):
+    """It is a candidate, and the vessel file with it simulates as the extended model does."""
+    vessel, rng = load_vessel(path), np.random.default_rng(1)
+    names = vessel.model.inputs
+    inputs = np.repeat(rng.uniform(0.2, 0.4, (5, len(names))), 12, axis=0)
+    batch = Batch(
+        name="run", sample_time_s=1.0, input_names=names, inputs=inputs, velocity=np.full((60, 3), 0.1),
+        pose=np.zeros((60, 3)), wind=np.zeros((60, 2)), depth_m=np.full(60, 30.0),
+    )  # fmt: skip
+    record = Record(batches=(batch,))
+    plain = extended_model(vessel, record)
+    windows = cut_windows(plain.model, record)
+    found = ACTUATOR_SCALE.candidates(Situation(ship=plain, windows=windows))
+    engines = [name for name in names if stem(name) == "n"]
+    wanted = {name for name in names if stem(name) == "rudder"} | ({*engines} if len(engines) > 1 else set())
+    keys = [key for one in found for key in one.free]
+    assert {names[column] for key in keys for column in group_columns(key[6:], names)} == wanted
+    start = initial_states(windows)
+    before = simulate_windows(plain, windows, start).predicted
+    for key in keys:
+        extended = plain.with_effects({key: -0.3})
+        one = simulate_windows(extended, windows, start).predicted
+        again, _ = extend(vessel, extended, {})
+        other = simulate_windows(extended_model(again, record), windows, start).predicted
+        assert np.abs(one - other).max() < 1e-9
+        assert np.abs(one - before).max() > 1e-6
 
 
 def test_a_yaw_moment_of_thrust_is_written_whatever_reads_it():

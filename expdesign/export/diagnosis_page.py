@@ -73,7 +73,7 @@ PATTERNS = (
     (re.compile(r"orders_late_(\w+)_s"), "delay of the recorded orders of {}"),
     (re.compile(r"deadband_(\w+?)(?:_rps|_rad)?"), "width of the dead band of {}"),
     (re.compile(r"angle_offset_(\w+)_rad"), "offset of {}"),
-    (re.compile(r"angle_factor_(\w+)"), "acting angle over recorded angle of {}"),
+    (re.compile(r"input_factor_(\w+)"), "acting over recorded {}"),
     (re.compile(r"(\w+)_delay_s"), "delay of the measured {}"),
     (re.compile(r"inertia_factor_(\w+)"), "inertia factor in {} (1: as in the model)"),
     (re.compile(r"(\w+)_factor"), "factor of {} after the change (1: no change)"),

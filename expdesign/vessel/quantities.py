@@ -376,8 +376,8 @@ OTHERS = (
         result="orders_late_{}_s", unit="s", low=0.0, high=60.0, matters=0.05, per="time",
     ),
     _share(
-        ACTUATORS, "scale", "share by which rudder angles exceed what is ordered, offset included", "angle_factor_{}",
-        -0.8, 1.5, 0.1,
+        ACTUATORS, "scale", "share by which rudder angles or one engine's speed exceed orders, offset included",
+        "input_factor_{}", -0.8, 1.5, 0.1,
     ),
     Quantity(
         stage=WEATHER, effects=("current",), words="steady current to north or east", result="{}_mps", unit="m/s",

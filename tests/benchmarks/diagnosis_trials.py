@@ -98,7 +98,7 @@ class Hidden:
             **{f"{kind}_{group}_s": e.get(f"{kind}_s", 0.0) for kind in ("lag", "delay") for group in groups},
             **{f"deadband_{group}{'' if ship == 'barge' else '_rad'}": e.get("deadband", 0.0) for group in angled},
             **{f"angle_offset_{group}_rad": e.get("angle_offset", 0.0) for group in angled},
-            "angle_factor_rudder": 1 + e.get("rudder_scale", 0.0), "thrust_offset_m": e.get("asymmetry", 0.0),
+            "input_factor_rudder": 1 + e.get("rudder_scale", 0.0), "thrust_offset_m": e.get("asymmetry", 0.0),
             **{f"inertia_factor_{axis}": 1 + e.get(f"load_{axis}", 0.0) for axis in "uvr"},
             "damping_growth": e.get("shallow_damping", 0.0), "inertia_growth": e.get("shallow_inertia", 0.0),
             "roll_period_s": e.get("roll_period_s", 0.0), "roll_damping_ratio": e.get("roll_damping", 0.0),

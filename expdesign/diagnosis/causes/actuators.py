@@ -216,31 +216,44 @@ LATE_ORDERS = Cause(
 
 
 def _candidates_scale(situation: Situation) -> tuple[Candidate, ...]:
-    """All rudders together, then each; other scales of inputs are gains of thrust."""
+    """All rudders together, then each, and each of several engines; one of all engines is a gain of thrust."""
     ship, inputs = situation.ship, situation.ship.model.inputs
-    if any(key.startswith("scale:") for key in ship.effects):
-        return ()
-    rudders = {*group_columns("rudder", inputs)}
-    groups = [group for group in input_groups(inputs) if {*group_columns(group, inputs)} <= rudders]
-    return tuple(Candidate(cause="actuator_scale", free={f"scale:{group}": 0.0}) for group in groups)
+    scaled = (key.split(":", 1)[1] for key in ship.effects if key.startswith("scale:"))
+    taken = {column for group in scaled for column in group_columns(group, inputs)}
+    rudders, engines = ({*group_columns(stem, inputs)} for stem in ("rudder", "n"))
+    found = []
+    for group in input_groups(inputs):
+        columns = {*group_columns(group, inputs)}
+        one_engine = len(columns) == 1 and columns < engines
+        if (columns <= rudders or one_engine) and not columns & taken:
+            found.append(Candidate(cause="actuator_scale", free={f"scale:{group}": 0.0}))
+    return tuple(found)
 
 
-def _explain_scale(values: Values, _ship: ExtendedModel) -> str:
+def _explain_scale(values: Values, ship: ExtendedModel) -> str:
     key, value, std = first(values)
-    return (
-        f"The {key.split(':')[1]} angle that acts is {rounded(100 * (1 + value), 100 * std)} % of the recorded one: "
-        "the ship answers as if every angle were that much larger or smaller."
+    group = key.split(":")[1]
+    what = "speed" if stem(group) == "n" else "angle"
+    text = (
+        f"The {group} {what} that acts is {rounded(100 * (1 + value), 100 * std)} % of the recorded one: the ship "
+        f"answers as if every {what} were that much larger or smaller."
     )
+    model = ship.model
+    rows = zip(model.expressions, model.parameter_std.tolist(), strict=True)
+    if what == "speed" and any(error and is_thrust(expression, model) for expression, error in rows):
+        text += " Engines differ by that much; whether this one or the others are not as stated depends on the thrust."
+    return text
 
 
 ACTUATOR_SCALE = Cause(
     name="actuator_scale",
-    title="Scale of the rudder angle",
-    missing="the scale of the rudder angle",
-    summary="rudders that turn by a share of the ordered angle: a wrong scale of the recorded orders or of the linkage",
+    title="Scale of a rudder's angle or of one engine's speed",
+    missing="the scale of an actuator",
+    summary="rudders, or one of several engines, that give a share of what is ordered: a wrong scale of the recorded "
+    "orders, of the linkage or of a stated speed, or an engine that is weaker than the others",
     candidates=_candidates_scale,
     explain=_explain_scale,
-    unseen="the ship has no rudder, or the scale is stated",
+    unseen="the ship has neither a rudder nor several engines, or the scale is stated",
 )
 
 

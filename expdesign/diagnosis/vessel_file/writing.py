@@ -125,9 +125,9 @@ def found_model(
 ) -> tuple[VesselModel, tuple[str, ...]]:
     """The model with the effects of `ship`, and notes on it, one sentence each."""
     rows = [*_own(model, ship, std), *_added(ship, std)]
-    rows = [_scaled(row, ship, std) for row in rows]
     if ship.get("asymmetry"):
         rows = _leaning(rows, model, ship, std.get("asymmetry", 0.0))
+    rows = [_scaled(row, ship, std) for row in rows]
     notes = []
     if "change:time" in ship.effects:
         notes.append("The vessel file describes the ship after the change.")
@@ -168,18 +168,35 @@ def _own(model: VesselModel, ship: ExtendedModel, std: Mapping[str, float]) -> l
 
 
 def _scaled(row: Row, ship: ExtendedModel, std: Mapping[str, float]) -> Row:
-    """A term that reads rudder angles, with their scale; its parameter is as uncertain as if it were linear in them."""
+    """A term that reads scaled inputs or their force; its parameter is as uncertain as if it were linear in them."""
     text, relative = row.term.expression, 0.0
     for key, value in ship.effects.items():
         if not key.startswith("scale:"):
             continue
         names = [ship.model.inputs[column] for column in group_columns(key.split(":", 1)[1], ship.model.inputs)]
         changed = re.sub(rf"\b({'|'.join(names)})\b", rf"({1.0 + value:.9g}*\1)", text)
+        for force, own in _own_force(ship, names).items():
+            changed = re.sub(rf"\b{force}\b", f"({force} + {value:.9g}*({own}))", changed)
         relative += 0.0 if changed == text else std.get(key, 0.0) / (1.0 + value)
         text = changed
     if text == row.term.expression:
         return row
     return replace(row, term=replace(row.term, expression=text), std=math.hypot(row.std, row.value * relative))
+
+
+def _own_force(ship: ExtendedModel, names: Sequence[str]) -> dict[str, str]:
+    """What engines with these speeds add to the forces, as terms read it: the texts of `Actuator.force`."""
+    parts: dict[str, list[str]] = {"tau_x": [], "tau_y": [], "tau_psi": []}
+    for one in ship.model.actuators:
+        if one.kind in ("force", "rudder", "depth") or one.signals[0] not in names:
+            continue
+        speed, *angle = one.signals
+        ahead = f"{speed}*cos({angle[0]})" if angle else speed if one.kind == "propeller" else "0"
+        side = f"{speed}*sin({angle[0]})" if angle else speed if one.kind == "tunnel" else "0"
+        parts["tau_x"].append(ahead)
+        parts["tau_y"].append(side)
+        parts["tau_psi"].append(f"{one.forward_m:.9g}*{side} - {one.starboard_m:.9g}*{ahead}")
+    return {force: " + ".join(texts) for force, texts in parts.items() if texts}
 
 
 def _added(ship: ExtendedModel, std: Mapping[str, float]) -> list[Row]:
