@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -88,15 +89,35 @@ class Family:
     name: str  # as in dictionary files
     summary: str  # one line for the user
     settings: tuple[Setting, ...]  # its parameters; each family also has `duration_s`
-    reference: Reference | None = None  # desired velocities; the builder computes commands within the actuators' limits
-    # commands, which suit vessels with propeller and rudder, too
+    # one of both: desired velocities, to which the builder computes commands within the actuators' limits, or commands,
+    # which suit vessels with propeller and rudder, too
+    reference: Reference | None = None
     orders: Orders | None = None
     # whether its commands depend on the simulated motion; its candidates are simulated one by one
     closed_loop: bool = False
 
-    def __post_init__(self) -> None:
-        if (self.reference is None) == (self.orders is None):
-            raise InputError(f"family {self.name!r} must have a reference or orders, and not both")
+
+def motion_family(*settings: Setting) -> Callable[[Reference], Family]:
+    """Makes a family of the function that states its velocities: its name, and its docstring as the summary."""
+    return lambda function: Family(
+        name=function.__name__, summary=_summary(function), settings=settings, reference=function
+    )
+
+
+def order_family(*settings: Setting, closed_loop: bool = False) -> Callable[[Orders], Family]:
+    """Makes a family of the function that states its commands, as `motion_family` does of velocities."""
+    return lambda function: Family(
+        name=function.__name__,
+        summary=_summary(function),
+        settings=settings,
+        orders=function,
+        closed_loop=closed_loop,
+    )
+
+
+def _summary(function: Callable[..., object]) -> str:
+    text = inspect.getdoc(function) or ""
+    return f"{text[:1].lower()}{text[1:].removesuffix('.')}"
 
 
 def complete_settings(family: Family, given: Mapping[str, float]) -> dict[str, float]:

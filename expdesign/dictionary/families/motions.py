@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting, share_setting, velocity_setting
+from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Setting, motion_family, share_setting, velocity_setting
 from expdesign.errors import InputError
 from expdesign.values import Array
 
@@ -65,62 +65,42 @@ def speed_change(time_s: Array, *, first: float, last: float, share: float) -> A
     return np.stack([surge, 0 * surge, 0 * surge], axis=1)
 
 
-def _reference_acceleration(settings: Mapping[str, float], time_s: Array) -> Array:
+@motion_family(
+    DURATION,
+    velocity_setting("surge", "speed_mps", "surge speed reached"),
+    velocity_setting("surge", "from_speed_mps", "surge speed at the start", default=0.0),
+    RAMP_FRACTION,
+)
+def acceleration(settings: Mapping[str, float], time_s: Array) -> Array:
+    """From a lower to a higher surge speed on a straight course."""
     first, last = settings["from_speed_mps"], settings["speed_mps"]
     return speed_change(time_s, first=first, last=last, share=settings["ramp_fraction"])
 
 
-ACCELERATION = Family(
-    name="acceleration",
-    summary="from a lower to a higher surge speed on a straight course",
-    settings=(
-        DURATION,
-        velocity_setting("surge", "speed_mps", "surge speed reached"),
-        velocity_setting("surge", "from_speed_mps", "surge speed at the start", default=0.0),
-        RAMP_FRACTION,
-    ),
-    reference=_reference_acceleration,
+@motion_family(
+    DURATION,
+    velocity_setting("surge", "speed_mps", "surge speed at the start"),
+    velocity_setting("surge", "to_speed_mps", "surge speed reached", default=0.0),
+    RAMP_FRACTION,
 )
-
-
-def _reference_deceleration(settings: Mapping[str, float], time_s: Array) -> Array:
+def deceleration(settings: Mapping[str, float], time_s: Array) -> Array:
+    """From a surge speed down to a lower one, or to rest, on a straight course."""
     first, last = settings["speed_mps"], settings["to_speed_mps"]
     return speed_change(time_s, first=first, last=last, share=settings["ramp_fraction"])
 
 
-DECELERATION = Family(
-    name="deceleration",
-    summary="from a surge speed down to a lower one, or to rest, on a straight course",
-    settings=(
-        DURATION,
-        velocity_setting("surge", "speed_mps", "surge speed at the start"),
-        velocity_setting("surge", "to_speed_mps", "surge speed reached", default=0.0),
-        RAMP_FRACTION,
-    ),
-    reference=_reference_deceleration,
+@motion_family(
+    DURATION,
+    velocity_setting("surge", "speed_mps", "surge speed"),
+    velocity_setting("yaw", "yaw_rate_radps", "yaw rate at the end, positive to starboard"),
+    velocity_setting("sway", "sway_mps", "sway speed, positive to starboard", default=0.0),
+    Setting(name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4, searched="time"),
 )
-
-
-def _reference_inward_spiral(settings: Mapping[str, float], time_s: Array) -> Array:
+def inward_spiral(settings: Mapping[str, float], time_s: Array) -> Array:
+    """Steady surge and sway while the yaw rate grows from zero, so the turn tightens."""
     surge = np.full_like(time_s, settings["speed_mps"])
     sway = settings["sway_mps"] * ramp(time_s, length_s=settings["entry_s"])
     return np.stack([surge, sway, settings["yaw_rate_radps"] * time_s / float(time_s[-1])], axis=1)
-
-
-INWARD_SPIRAL = Family(
-    name="inward_spiral",
-    summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
-    settings=(
-        DURATION,
-        velocity_setting("surge", "speed_mps", "surge speed"),
-        velocity_setting("yaw", "yaw_rate_radps", "yaw rate at the end, positive to starboard"),
-        velocity_setting("sway", "sway_mps", "sway speed, positive to starboard", default=0.0),
-        Setting(
-            name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4, searched="time"
-        ),
-    ),
-    reference=_reference_inward_spiral,
-)
 
 
 def _sum_of_sines(time_s: Array, *, period_s: float, first: int) -> Array:
@@ -132,64 +112,46 @@ def _sum_of_sines(time_s: Array, *, period_s: float, first: int) -> Array:
     return np.asarray(wave / max(float(np.abs(wave).max()), 1e-12))
 
 
-def _reference_multisine(settings: Mapping[str, float], time_s: Array) -> Array:
+@motion_family(
+    WHOLE_PERIODS,
+    Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
+    velocity_setting("surge", "speed_mps", "mean surge speed"),
+    velocity_setting("surge", "speed_swing_mps", "amplitude of surge speed", default=0.0, signed=False),
+    velocity_setting("sway", "sway_mps", "largest sway speed", default=0.0),
+    velocity_setting("yaw", "yaw_rate_radps", "largest yaw rate", default=0.0),
+)
+def multisine(settings: Mapping[str, float], time_s: Array) -> Array:
+    """Multisines in surge speed, sway speed and yaw rate, with four different frequencies each."""
     swing, side, turn = (_sum_of_sines(time_s, period_s=settings["period_s"], first=first) for first in (1, 2, 3))
     surge = settings["speed_mps"] + settings["speed_swing_mps"] * swing
     return np.stack([surge, settings["sway_mps"] * side, settings["yaw_rate_radps"] * turn], axis=1)
 
 
-MULTISINE = Family(
-    name="multisine",
-    summary="multisines in surge speed, sway speed and yaw rate, with four different frequencies each",
-    settings=(
-        WHOLE_PERIODS,
-        Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
-        velocity_setting("surge", "speed_mps", "mean surge speed"),
-        velocity_setting("surge", "speed_swing_mps", "amplitude of surge speed", default=0.0, signed=False),
-        velocity_setting("sway", "sway_mps", "largest sway speed", default=0.0),
-        velocity_setting("yaw", "yaw_rate_radps", "largest yaw rate", default=0.0),
-    ),
-    reference=_reference_multisine,
+@motion_family(
+    DURATION,
+    velocity_setting("sway", "sway_mps", "sway speed, positive to starboard"),
+    Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
+    velocity_setting("surge", "speed_mps", "surge speed", default=0.0),
+    share_setting("held_fraction", "share of the run after which the sway returns to zero", default=0.6, low=0.05),
 )
-
-
-def _reference_sway_step(settings: Mapping[str, float], time_s: Array) -> Array:
+def sway_step(settings: Mapping[str, float], time_s: Array) -> Array:
+    """A step of sway speed on a steady heading, and back."""
     rise_s, held_s = settings["rise_s"], settings["held_fraction"] * float(time_s[-1])
     sway = settings["sway_mps"] * (ramp(time_s, length_s=rise_s) - ramp(time_s, start_s=held_s, length_s=rise_s))
     return np.stack([np.full_like(time_s, settings["speed_mps"]), sway, 0 * sway], axis=1)
 
 
-SWAY_STEP = Family(
-    name="sway_step",
-    summary="a step of sway speed on a steady heading, and back",
-    settings=(
-        DURATION,
-        velocity_setting("sway", "sway_mps", "sway speed, positive to starboard"),
-        Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
-        velocity_setting("surge", "speed_mps", "surge speed", default=0.0),
-        share_setting("held_fraction", "share of the run after which the sway returns to zero", default=0.6, low=0.05),
-    ),
-    reference=_reference_sway_step,
+@motion_family(
+    WHOLE_PERIODS,
+    velocity_setting("sway", "sway_mps", "largest sway speed; the first push is to starboard"),
+    Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
+    velocity_setting("surge", "speed_mps", "surge speed", default=0.0),
 )
-
-
-def _reference_sway_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
+def sway_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
+    """Alternating sideways motion on a steady heading, with or without headway."""
     wave = flat_wave(time_s, period_s=settings["period_s"])
     surge = np.full_like(time_s, settings["speed_mps"])
     return np.stack([surge, settings["sway_mps"] * wave, 0 * wave], axis=1)
-
-
-SWAY_ZIGZAG = Family(
-    name="sway_zigzag",
-    summary="alternating sideways motion on a steady heading, with or without headway",
-    settings=(
-        WHOLE_PERIODS,
-        velocity_setting("sway", "sway_mps", "largest sway speed; the first push is to starboard"),
-        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
-        velocity_setting("surge", "speed_mps", "surge speed", default=0.0),
-    ),
-    reference=_reference_sway_zigzag,
-)
 
 
 def _switching(rng: np.random.Generator, time_s: Array, *, hold_s: float, rise_s: float) -> Array:
@@ -202,7 +164,20 @@ def _switching(rng: np.random.Generator, time_s: Array, *, hold_s: float, rise_s
     return np.asarray(sign * (1.0 - level))
 
 
-def _reference_telegraph(settings: Mapping[str, float], time_s: Array) -> Array:
+@motion_family(
+    DURATION,
+    velocity_setting("surge", "speed_mps", "mean surge speed"),
+    velocity_setting("surge", "speed_swing_mps", "amplitude of surge speed", signed=False),
+    velocity_setting("sway", "sway_mps", "sway speed to both sides", signed=False),
+    velocity_setting("yaw", "yaw_rate_radps", "yaw rate to both sides", signed=False),
+    Setting(name="hold_s", meaning="mean time between switches", low=1e-2, high=1e5, searched="time"),
+    Setting(name="rise_s", meaning="time that a switch takes", low=1e-2, high=1e4, searched="time"),
+    Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
+    velocity_setting("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
+    velocity_setting("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
+)
+def telegraph(settings: Mapping[str, float], time_s: Array) -> Array:
+    """Random switching of surge speed, sway speed and yaw rate between two levels each."""
     rng = np.random.default_rng(int(settings["draw"]))
     hold_s, rise_s = settings["hold_s"], settings["rise_s"]
     swing, sway, yaw = (_switching(rng, time_s, hold_s=hold_s, rise_s=rise_s) for _ in range(3))
@@ -213,65 +188,34 @@ def _reference_telegraph(settings: Mapping[str, float], time_s: Array) -> Array:
     return np.stack([surge, side, turn], axis=1)
 
 
-TELEGRAPH = Family(
-    name="telegraph",
-    summary="random switching of surge speed, sway speed and yaw rate between two levels each",
-    settings=(
-        DURATION,
-        velocity_setting("surge", "speed_mps", "mean surge speed"),
-        velocity_setting("surge", "speed_swing_mps", "amplitude of surge speed", signed=False),
-        velocity_setting("sway", "sway_mps", "sway speed to both sides", signed=False),
-        velocity_setting("yaw", "yaw_rate_radps", "yaw rate to both sides", signed=False),
-        Setting(name="hold_s", meaning="mean time between switches", low=1e-2, high=1e5, searched="time"),
-        Setting(name="rise_s", meaning="time that a switch takes", low=1e-2, high=1e4, searched="time"),
-        Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
-        velocity_setting("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
-        velocity_setting("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
-    ),
-    reference=_reference_telegraph,
+@motion_family(
+    DURATION,
+    velocity_setting("surge", "speed_mps", "approach speed"),
+    velocity_setting("surge", "turn_speed_mps", "surge speed in the turn"),
+    velocity_setting("yaw", "yaw_rate_radps", "yaw rate in the turn, positive to starboard"),
+    Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4, searched="time"),
+    velocity_setting("sway", "sway_mps", "outward sway, positive to port", default=0.0),
 )
-
-
-def _reference_turning_circle(settings: Mapping[str, float], time_s: Array) -> Array:
+def turning_circle(settings: Mapping[str, float], time_s: Array) -> Array:
+    """A turn to one side from a straight approach to a steady yaw rate, drifting outwards."""
     entered = ramp(time_s, length_s=settings["entry_s"])
     surge = settings["speed_mps"] + (settings["turn_speed_mps"] - settings["speed_mps"]) * entered
     return np.stack([surge, -settings["sway_mps"] * entered, settings["yaw_rate_radps"] * entered], axis=1)
 
 
-TURNING_CIRCLE = Family(
-    name="turning_circle",
-    summary="a turn to one side from a straight approach to a steady yaw rate, drifting outwards",
-    settings=(
-        DURATION,
-        velocity_setting("surge", "speed_mps", "approach speed"),
-        velocity_setting("surge", "turn_speed_mps", "surge speed in the turn"),
-        velocity_setting("yaw", "yaw_rate_radps", "yaw rate in the turn, positive to starboard"),
-        Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4, searched="time"),
-        velocity_setting("sway", "sway_mps", "outward sway, positive to port", default=0.0),
-    ),
-    reference=_reference_turning_circle,
+@motion_family(
+    WHOLE_PERIODS,
+    velocity_setting("surge", "speed_mps", "surge speed"),
+    velocity_setting("yaw", "yaw_rate_radps", "largest yaw rate; the first turn is to starboard"),
+    Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
+    velocity_setting("sway", "sway_mps", "largest outward sway speed", default=0.0),
+    velocity_setting("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
+    velocity_setting("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
 )
-
-
-def _reference_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
+def zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
+    """Alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns."""
     wave = flat_wave(time_s, period_s=settings["period_s"])
     surge = np.full_like(time_s, settings["speed_mps"])
     offset = envelope(time_s, length_s=settings["period_s"] / 4)
     sway = settings["sway_offset_mps"] * offset - settings["sway_mps"] * wave
     return np.stack([surge, sway, settings["yaw_offset_radps"] * offset + settings["yaw_rate_radps"] * wave], axis=1)
-
-
-ZIGZAG = Family(
-    name="zigzag",
-    summary="alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns",
-    settings=(
-        WHOLE_PERIODS,
-        velocity_setting("surge", "speed_mps", "surge speed"),
-        velocity_setting("yaw", "yaw_rate_radps", "largest yaw rate; the first turn is to starboard"),
-        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
-        velocity_setting("sway", "sway_mps", "largest outward sway speed", default=0.0),
-        velocity_setting("sway", "sway_offset_mps", "steady sway added to it", default=0.0),
-        velocity_setting("yaw", "yaw_offset_radps", "steady yaw rate added to it", default=0.0),
-    ),
-    reference=_reference_zigzag,
-)

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import wraps
 
 import numpy as np
 
-from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting, share_setting
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting, order_family, share_setting
 from expdesign.dictionary.trim import hold
 from expdesign.errors import InputError
 from expdesign.signals import Commands
@@ -28,6 +29,8 @@ HELM_OFFSET = Setting(
     name="helm_offset_rad", meaning="steady helm added to it", default=0.0, low=-1.5, high=1.5, searched="helm"
 )
 HALF_TURN = np.pi / 2
+Helm = Callable[[PrimitiveSpec, Array], Array]
+"""(request, time_s (k,)) -> (k,) helm [rad], positive to starboard."""
 
 
 def helm_setting(meaning: str, *, default: float | None = None) -> Setting:
@@ -72,17 +75,19 @@ def ordered(approach: Approach, drive: Array, helm_rad: Array) -> Excitation:
     return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=rows[place.ravel()])
 
 
-def helm_family(
-    helm: Callable[[PrimitiveSpec, Array], Array],
-) -> Callable[[Vessel, PrimitiveSpec], Excitation]:
-    """Orders with the approach's engine order and the helm `helm`(request, time_s (k,)) -> (k,) rad."""
+def helm_family(*settings: Setting) -> Callable[[Helm], Family]:
+    """Makes a family of the function that states its helm; the engine order is the approach's."""
 
-    def orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
-        approach = steered(steady_ahead(vessel, request.settings["speed_mps"]))
-        time_s = run_times(vessel, request)
-        return ordered(approach, np.full_like(time_s, approach.drive), helm(request, time_s))
+    def family(helm: Helm) -> Family:
+        @wraps(helm)
+        def orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+            approach = steered(steady_ahead(vessel, request.settings["speed_mps"]))
+            time_s = run_times(vessel, request)
+            return ordered(approach, np.full_like(time_s, approach.drive), helm(request, time_s))
 
-    return orders
+        return order_family(*settings)(orders)
+
+    return family
 
 
 # Crash stop: engines astern until she lies still. Where the file states no time, slower ships of the prior do, too.
@@ -93,7 +98,36 @@ LONGEST_STOP = 3.0  # times that of the nominal ship, however long the rest take
 WATCHED_LENGTHS = 40.0  # ship lengths at the approach's speed in which a ship is seen to stop
 
 
-def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+def _still(vessel: Vessel, run: Excitation, parameters: list[Array]) -> Array:
+    """(n,) samples after which ships of these parameters have no headway in a run; its length where they keep some."""
+    commands = within_limits(vessel.actuators, run.commands, sample_time_s=vessel.sample_time_s, before=run.inputs)
+    pose = np.zeros((len(parameters), 3))
+    states = simulate_many(
+        vessel, Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=commands), pose=pose,
+        velocity=pose + run.velocity, standing=run.inputs, current_to=pose[:, :2], wind_to=pose[:, :2],
+        parameters=np.array(parameters),
+    )  # fmt: skip
+    ahead = np.nan_to_num(states[:-1, :, 3], nan=1.0) > 0.0
+    return np.asarray(np.cumprod(ahead, axis=0).sum(axis=0))
+
+
+@order_family(
+    replace(
+        DURATION,
+        meaning="duration of one run; 0 for engines astern until 95 % of the ships of the prior lie still",
+        default=0.0,
+        low=0.0,
+    ),
+    APPROACH,
+    share_setting("astern", "engine order, 1 for full astern", default=1.0),
+    share_setting(
+        "astern_fraction",
+        "share of a stated duration that engines go astern; 0 for until the nominal ship lies still",
+        default=0.0,
+    ),
+)
+def crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Engines astern from a straight approach until the ship lies still or for a share of the run, then stopped."""
     approach, given = steady_ahead(vessel, request.settings["speed_mps"]), request.settings
     astern, step_s = -given["astern"], vessel.sample_time_s
     length_s = given["duration_s"] or WATCHED_LENGTHS * vessel.length_m / float(approach.velocity[0])
@@ -114,42 +148,14 @@ def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     return Excitation(velocity=whole.velocity, inputs=whole.inputs, commands=whole.commands[:samples])
 
 
-def _still(vessel: Vessel, run: Excitation, parameters: list[Array]) -> Array:
-    """(n,) samples after which ships of these parameters have no headway in a run; its length where they keep some."""
-    commands = within_limits(vessel.actuators, run.commands, sample_time_s=vessel.sample_time_s, before=run.inputs)
-    pose = np.zeros((len(parameters), 3))
-    states = simulate_many(
-        vessel, Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=commands), pose=pose,
-        velocity=pose + run.velocity, standing=run.inputs, current_to=pose[:, :2], wind_to=pose[:, :2],
-        parameters=np.array(parameters),
-    )  # fmt: skip
-    ahead = np.nan_to_num(states[:-1, :, 3], nan=1.0) > 0.0
-    return np.asarray(np.cumprod(ahead, axis=0).sum(axis=0))
-
-
-CRASH_STOP = Family(
-    name="crash_stop",
-    summary="engines astern from a straight approach until the ship lies still or for a share of the run, then stopped",
-    settings=(
-        replace(
-            DURATION,
-            meaning="duration of one run; 0 for engines astern until 95 % of the ships of the prior lie still",
-            default=0.0,
-            low=0.0,
-        ),
-        APPROACH,
-        share_setting("astern", "engine order, 1 for full astern", default=1.0),
-        share_setting(
-            "astern_fraction",
-            "share of a stated duration that engines go astern; 0 for until the nominal ship lies still",
-            default=0.0,
-        ),
-    ),
-    orders=_orders_crash_stop,
+@helm_family(
+    DURATION,
+    APPROACH,
+    helm_setting("largest helm, where it begins; positive to starboard", default=float(np.radians(15.0))),
+    Setting(name="steps", meaning="steps of helm to each side, a whole number", default=3.0, low=1, high=50),
 )
-
-
-def _helm_dieudonne_spiral(request: PrimitiveSpec, time_s: Array) -> Array:
+def dieudonne_spiral(request: PrimitiveSpec, time_s: Array) -> Array:
+    """Helm in equal steps from one side to the other and back, each held for the same time."""
     steps = round(request.settings["steps"])
     down = np.linspace(1.0, -1.0, 2 * steps + 1)
     levels = np.concatenate([down, down[-2::-1]])  # to the other side and back
@@ -157,41 +163,29 @@ def _helm_dieudonne_spiral(request: PrimitiveSpec, time_s: Array) -> Array:
     return np.asarray(request.settings["helm_rad"] * levels[np.minimum(place, len(levels) - 1)])
 
 
-DIEUDONNE_SPIRAL = Family(
-    name="dieudonne_spiral",
-    summary="helm in equal steps from one side to the other and back, each held for the same time",
-    settings=(
-        DURATION,
-        APPROACH,
-        helm_setting("largest helm, where it begins; positive to starboard", default=float(np.radians(15.0))),
-        Setting(name="steps", meaning="steps of helm to each side, a whole number", default=3.0, low=1, high=50),
-    ),
-    orders=helm_family(_helm_dieudonne_spiral),
-)
-
-
 # Pull-out: a turn, then helm amidships; the decay of the yaw rate shows whether the ship is stable on course.
 
 
-def _helm_pull_out(request: PrimitiveSpec, time_s: Array) -> Array:
+@helm_family(
+    DURATION,
+    APPROACH,
+    helm_setting("helm in the turn, positive to starboard", default=float(np.radians(20.0))),
+    share_setting("turn_fraction", "share of the run with the helm over", default=0.5, low=0.05, high=0.95),
+)
+def pull_out(request: PrimitiveSpec, time_s: Array) -> Array:
+    """Helm over for a share of the run, then back to the course-keeping angle."""
     turning = time_s < request.settings["turn_fraction"] * request.settings["duration_s"]
     return np.where(turning, request.settings["helm_rad"], 0.0)
 
 
-PULL_OUT = Family(
-    name="pull_out",
-    summary="helm over for a share of the run, then back to the course-keeping angle",
-    settings=(
-        DURATION,
-        APPROACH,
-        helm_setting("helm in the turn, positive to starboard", default=float(np.radians(20.0))),
-        share_setting("turn_fraction", "share of the run with the helm over", default=0.5, low=0.05, high=0.95),
-    ),
-    orders=helm_family(_helm_pull_out),
+@order_family(
+    Setting(name="duration_s", meaning="duration of one run, that of the file", low=1e-3, high=1e5),
+    Setting(name="speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50),
+    Setting(name="sway_mps", meaning="sway speed at the start", default=0.0, low=-20, high=20),
+    Setting(name="yaw_rate_radps", meaning="yaw rate at the start", default=0.0, low=-5, high=5),
 )
-
-
-def _orders_recorded(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+def recorded(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Commands read from a CSV file, recorded or made by hand."""
     recorded, settings = request.commands, request.settings
     if recorded is None:
         raise InputError("family 'recorded' needs commands, which a dictionary file gives by the key file")
@@ -210,19 +204,6 @@ def _orders_recorded(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     return Excitation(velocity=velocity, inputs=hold(vessel, velocity), commands=values)
 
 
-RECORDED = Family(
-    name="recorded",
-    summary="commands read from a CSV file, recorded or made by hand",
-    settings=(
-        Setting(name="duration_s", meaning="duration of one run, that of the file", low=1e-3, high=1e5),
-        Setting(name="speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50),
-        Setting(name="sway_mps", meaning="sway speed at the start", default=0.0, low=-20, high=20),
-        Setting(name="yaw_rate_radps", meaning="yaw rate at the start", default=0.0, low=-5, high=5),
-    ),
-    orders=_orders_recorded,
-)
-
-
 def _levels(rng: np.random.Generator, time_s: Array, hold_s: float, count: int) -> Array:
     """(k,) levels between -1 and 1, each held for an exponential time of mean `hold_s`; `count` of them, 0 for any."""
     many = 8 + int(8 * (time_s[-1] + 1.0) / hold_s)
@@ -233,7 +214,24 @@ def _levels(rng: np.random.Generator, time_s: Array, hold_s: float, count: int) 
     return np.asarray(drawn[np.searchsorted(changes, time_s)])
 
 
-def _orders_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+@order_family(
+    DURATION,
+    APPROACH,
+    helm_setting("largest helm to both sides"),
+    Setting(name="hold_s", meaning="mean time between steps", low=1e-2, high=1e5, searched="time"),
+    share_setting("engine_swing", "largest change of the engine order, as a share of full ahead", default=0.0, high=2),
+    HELM_OFFSET,
+    Setting(
+        name="levels",
+        meaning="number of even levels from one side to the other, a whole number: 2 for hard to hard; 0 for any",
+        default=0.0,
+        low=0,
+        high=100,
+    ),
+    Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
+)
+def steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Engine order and helm step to random levels about the approach's, held for random times."""
     settings, time_s = request.settings, run_times(vessel, request)
     approach = steered(steady_ahead(vessel, settings["speed_mps"]))
     rng = np.random.default_rng(int(settings["draw"]))
@@ -245,44 +243,32 @@ def _orders_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
     return ordered(approach, drive, settings["helm_offset_rad"] + settings["helm_rad"] * helm)
 
 
-STEPS = Family(
-    name="steps",
-    summary="engine order and helm step to random levels about the approach's, held for random times",
-    settings=(
-        DURATION,
-        APPROACH,
-        helm_setting("largest helm to both sides"),
-        Setting(name="hold_s", meaning="mean time between steps", low=1e-2, high=1e5, searched="time"),
-        share_setting(
-            "engine_swing", "largest change of the engine order, as a share of full ahead", default=0.0, high=2
-        ),
-        HELM_OFFSET,
-        Setting(
-            name="levels",
-            meaning="number of even levels from one side to the other, a whole number: 2 for hard to hard; 0 for any",
-            default=0.0,
-            low=0,
-            high=100,
-        ),
-        Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
-    ),
-    orders=_orders_steps,
+@helm_family(
+    DURATION,
+    APPROACH,
+    helm_setting("helm, positive to starboard", default=float(np.radians(35.0))),
 )
-
-
-def _helm_turning_circle_helm(request: PrimitiveSpec, time_s: Array) -> Array:
+def turning_circle_helm(request: PrimitiveSpec, time_s: Array) -> Array:
+    """Helm over from a straight approach and held; engines as on the approach."""
     return np.full_like(time_s, request.settings["helm_rad"])
 
 
-TURNING_CIRCLE_HELM = Family(
-    name="turning_circle_helm",
-    summary="helm over from a straight approach and held; engines as on the approach",
-    settings=(DURATION, APPROACH, helm_setting("helm, positive to starboard", default=float(np.radians(35.0)))),
-    orders=helm_family(_helm_turning_circle_helm),
+@order_family(
+    DURATION,
+    APPROACH,
+    helm_setting("helm; positive turns to starboard first", default=float(np.radians(10.0))),
+    Setting(
+        name="heading_rad",
+        meaning="change of heading at which the helm is reversed",
+        default=float(np.radians(10.0)),
+        low=1e-3,
+        high=np.pi,
+        searched="heading",
+    ),
+    closed_loop=True,
 )
-
-
-def _orders_zigzag_heading(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+def zigzag_heading(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Helm to one side until the heading has changed by a given angle, then to the other, and so on."""
     settings = request.settings
     approach = steady_ahead(vessel, settings["speed_mps"])
     commands, _ = zigzag(
@@ -293,24 +279,3 @@ def _orders_zigzag_heading(vessel: Vessel, request: PrimitiveSpec) -> Excitation
         conduct=Conduct(speed_mps=settings["speed_mps"], duration_s=settings["duration_s"]),
     )
     return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=commands.values)
-
-
-ZIGZAG_HEADING = Family(
-    name="zigzag_heading",
-    summary="helm to one side until the heading has changed by a given angle, then to the other, and so on",
-    settings=(
-        DURATION,
-        APPROACH,
-        helm_setting("helm; positive turns to starboard first", default=float(np.radians(10.0))),
-        Setting(
-            name="heading_rad",
-            meaning="change of heading at which the helm is reversed",
-            default=float(np.radians(10.0)),
-            low=1e-3,
-            high=np.pi,
-            searched="heading",
-        ),
-    ),
-    orders=_orders_zigzag_heading,
-    closed_loop=True,
-)

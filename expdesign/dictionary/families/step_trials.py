@@ -28,7 +28,7 @@ from expdesign.dictionary.families.orders import (
     run_times,
     steered,
 )
-from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting, share_setting
+from expdesign.dictionary.spec import DURATION, Excitation, PrimitiveSpec, Setting, order_family, share_setting
 from expdesign.errors import InputError
 from expdesign.simulation.helm import Approach, steady_ahead
 from expdesign.values import Array
@@ -37,7 +37,17 @@ from expdesign.vessel import NUMPY, Vessel
 # Waves of helm and engine order about the approach's: inputs unlike steps, to validate with what steps gave.
 
 
-def _orders_helm_and_engine_waves(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+@order_family(
+    DURATION,
+    APPROACH,
+    helm_setting("amplitude of the helm; positive begins to starboard"),
+    Setting(name="helm_period_s", meaning="period of the helm", low=1e-2, high=1e4, searched="time"),
+    share_setting("engine_swing", "amplitude of the engine order, as a share of full ahead", default=0.0, high=0.5),
+    Setting(name="engine_period_s", meaning="period of the engine order", low=1e-2, high=1e4, searched="time"),
+    HELM_OFFSET,
+)
+def helm_and_engine_waves(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Helm and engine order go up and down in sine waves about the approach's."""
     settings, time_s = request.settings, run_times(vessel, request)
     approach = steered(steady_ahead(vessel, settings["speed_mps"]))
     swing = settings["engine_swing"]
@@ -49,22 +59,6 @@ def _orders_helm_and_engine_waves(vessel: Vessel, request: PrimitiveSpec) -> Exc
     helm = settings["helm_rad"] * np.sin(2 * np.pi * time_s / settings["helm_period_s"])
     drive = approach.drive + swing * np.sin(2 * np.pi * time_s / settings["engine_period_s"])
     return ordered(approach, drive, settings["helm_offset_rad"] + helm)
-
-
-HELM_AND_ENGINE_WAVES = Family(
-    name="helm_and_engine_waves",
-    summary="helm and engine order go up and down in sine waves about the approach's",
-    settings=(
-        DURATION,
-        APPROACH,
-        helm_setting("amplitude of the helm; positive begins to starboard"),
-        Setting(name="helm_period_s", meaning="period of the helm", low=1e-2, high=1e4, searched="time"),
-        share_setting("engine_swing", "amplitude of the engine order, as a share of full ahead", default=0.0, high=0.5),
-        Setting(name="engine_period_s", meaning="period of the engine order", low=1e-2, high=1e4, searched="time"),
-        HELM_OFFSET,
-    ),
-    orders=_orders_helm_and_engine_waves,
-)
 
 
 # How long a level must be held: until drawn vessels are steady, and then for a circle.
@@ -280,18 +274,6 @@ def turn_near(approach: Approach, helm_rad: float, near: Array) -> Array:
 TRIED = 13  # helm angles whose steady turns are computed
 
 
-def _orders_rudder_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
-    settings = request.settings
-    approach = steered(steady_ahead(vessel, settings["speed_mps"]))
-    most = eased(request, approach.drive, settings["helm_rad"])
-    approach.helm.check(approach.drive, approach.angle_rad + approach.starboard * most)
-    least = float(np.copysign(settings["least_helm_rad"], most))
-    if abs(least) >= abs(most):
-        raise InputError(f"least_helm_rad is {abs(least):g}, expected less than the largest helm, {abs(most):g}")
-    angles = _evenly_turning(approach, least, most, rises(request))
-    return staircase(request, approach, [(approach, angle) for angle in angles.tolist()])
-
-
 def _evenly_turning(approach: Approach, least: float, most: float, shares: Array) -> Array:
     """(n,) helm angles whose steady yaw rates are at shares (n,) of the way from that of `least` to that of `most`.
 
@@ -310,43 +292,43 @@ def _evenly_turning(approach: Approach, least: float, most: float, shares: Array
     return np.asarray(np.interp(slowest + (size[-1] - slowest) * shares, size, angles))
 
 
-RUDDER_STEPS = Family(
-    name="rudder_steps",
-    summary="helm over in steps and back again, each held until steady; engine order held",
-    settings=(
-        STAIR_DURATION,
-        APPROACH,
-        helm_setting("largest helm, positive to starboard", default=float(np.radians(15.0))),
-        Setting(
-            name="least_helm_rad",
-            meaning="smallest helm, to the same side: 0 for straight ahead, more to turn all the time in little room",
-            default=0.0,
-            low=0.0,
-            high=HALF_TURN,
-        ),
-        *STAIRCASE_SETTINGS,
+@order_family(
+    STAIR_DURATION,
+    APPROACH,
+    helm_setting("largest helm, positive to starboard", default=float(np.radians(15.0))),
+    Setting(
+        name="least_helm_rad",
+        meaning="smallest helm, to the same side: 0 for straight ahead, more to turn all the time in little room",
+        default=0.0,
+        low=0.0,
+        high=HALF_TURN,
     ),
-    orders=_orders_rudder_steps,
+    *STAIRCASE_SETTINGS,
 )
+def rudder_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Helm over in steps and back again, each held until steady; engine order held."""
+    settings = request.settings
+    approach = steered(steady_ahead(vessel, settings["speed_mps"]))
+    most = eased(request, approach.drive, settings["helm_rad"])
+    approach.helm.check(approach.drive, approach.angle_rad + approach.starboard * most)
+    least = float(np.copysign(settings["least_helm_rad"], most))
+    if abs(least) >= abs(most):
+        raise InputError(f"least_helm_rad is {abs(least):g}, expected less than the largest helm, {abs(most):g}")
+    angles = _evenly_turning(approach, least, most, rises(request))
+    return staircase(request, approach, [(approach, angle) for angle in angles.tolist()])
 
 
-def _orders_throttle_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+@order_family(
+    STAIR_DURATION,
+    APPROACH,
+    helm_setting("helm held throughout, positive to starboard", default=0.0),
+    Setting(name="rise", meaning="highest steady speed over the approach speed", default=1.5, low=1.01, high=50),
+    *STAIRCASE_SETTINGS,
+)
+def throttle_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    """Engine order in steps up to the highest speed and down again, each held until steady; helm held."""
     settings = request.settings
     speeds = settings["speed_mps"] * (1.0 + (settings["rise"] - 1.0) * rises(request))
     approaches = [steady_ahead(vessel, speed) for speed in speeds.tolist()]
     levels = [(one, eased(request, one.drive, settings["helm_rad"])) for one in approaches]
     return staircase(request, steady_ahead(vessel, settings["speed_mps"]), levels)
-
-
-THROTTLE_STEPS = Family(
-    name="throttle_steps",
-    summary="engine order in steps up to the highest speed and down again, each held until steady; helm held",
-    settings=(
-        STAIR_DURATION,
-        APPROACH,
-        helm_setting("helm held throughout, positive to starboard", default=0.0),
-        Setting(name="rise", meaning="highest steady speed over the approach speed", default=1.5, low=1.01, high=50),
-        *STAIRCASE_SETTINGS,
-    ),
-    orders=_orders_throttle_steps,
-)
