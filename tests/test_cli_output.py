@@ -337,7 +337,7 @@ def test_a_mistyped_key_is_told_before_solvers_load_and_processes_start(tmp_path
     loaded, told = modules_after(*calls)
     assert told.count("totl_s") == len(calls)
     assert "expdesign.scenario.design_file" in loaded
-    slow = ("cvxpy", "matplotlib.", "pyogrio", "numba", "joblib.externals.loky.backend.popen_loky_posix")
+    slow = ("cvxpy", "matplotlib.", "pyogrio", "joblib.externals.loky.backend.popen_loky_posix")
     slow += tuple(f"scipy.{part}" for part in ("fft", "interpolate", "linalg", "ndimage", "optimize", "signal"))
     slow += tuple(f"scipy.{part}" for part in ("sparse", "spatial", "special", "stats"))
     assert [name for name in loaded if name.startswith(slow)] == []

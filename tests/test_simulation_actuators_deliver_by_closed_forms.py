@@ -217,14 +217,13 @@ def test_a_run_is_that_of_the_ship_with_its_lags_as_states():
 
 @pytest.mark.parametrize(("integrator", "substeps"), [("rk4", 2), ("rk4", 1), ("euler", 1), ("euler", 3)])
 @pytest.mark.parametrize("responses", [(IDEAL,) * 4, (SPEED, ANGLE, IDEAL, ANGLE), (SLEWING, ALL, IDEAL, SLEWING)])
-@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=pytest.mark.optional)])
-def test_one_run_and_many_runs_agree(integrator: str, substeps: int, responses: tuple[Response, ...], engine: str):
+def test_one_run_and_many_runs_agree(integrator: str, substeps: int, responses: tuple[Response, ...]):
     ship = sluggish(*responses)
     runs = [random_commands(70, seed) for seed in range(3)]
     how = {"standing": STANDING, "substeps": substeps}
     many = simulate_ensemble(
         ship, np.stack([c.values for c in runs], axis=1), runs=3, environment=SEA, rng=np.random.default_rng(0),
-        velocity=(1.0, 0.2, 0.0), integrator=integrator, engine=engine, **how,
+        velocity=(1.0, 0.2, 0.0), integrator=integrator, **how,
     )  # fmt: skip
     for index, commands in enumerate(runs):
         alone = simulate(ship, commands, velocity=(1.0, 0.2, 0.0), environment=SEA, integrator=integrator, **how)

@@ -23,7 +23,7 @@ try:
 except ImportError:
     raise InputError("--scheduler needs Dask, expected the extra: pip install 'expdesign[cluster]'") from None
 
-COMPARED = ("casadi", "clarabel", "cvxpy", "numba", "numpy", "ompl", "scipy", "shapely")
+COMPARED = ("casadi", "clarabel", "cvxpy", "numpy", "ompl", "scipy", "shapely")
 """Packages that results may depend on, besides our own: workers have the versions that are here."""
 LOGGERS = ("distributed", "distributed.client", "distributed.batched", "distributed.core", "distributed.comm")
 """They tell of lost connections, each in its own words."""

@@ -19,7 +19,6 @@ import numpy as np
 
 from expdesign.errors import InputError, ShapeError
 from expdesign.signals import Batch
-from expdesign.simulation._numba import kernels
 from expdesign.simulation.actuation import deliver, step_shares, step_times
 from expdesign.simulation.environment import Environment, vary
 from expdesign.simulation.motion import begun, integrator_step, turns_current
@@ -82,7 +81,6 @@ def simulate_ensemble(
     weather: Array | None = None,
     integrator: str = "euler",
     substeps: int = 1,
-    engine: str = "numpy",
 ) -> Ensemble:
     """Simulate and measure many trials.
 
@@ -96,8 +94,6 @@ def simulate_ensemble(
         weather: (4, runs) mean current and wind of each run to north and east [m/s], as by `mean_weather`.
         integrator: "euler", the map of discrete parameters (with one substep), or "rk4".
         substeps: integrator steps per sample; current and wind are held over a sample.
-        engine: "numpy", or "numba" for compiled loops where numba is installed; the random numbers are the same, the
-            results agree to rounding.
 
     Raises:
         ShapeError: inputs that do not fit.
@@ -107,9 +103,7 @@ def simulate_ensemble(
     step = integrator_step(integrator, vessel.model)
     commands = _commands(vessel, inputs, runs)
     standing = None if standing is None else np.asarray(standing, dtype=float).reshape(commands.shape[2], 1)
-    program = RatesProgram(
-        vessel.model, runs=runs, parameters=parameters, engine=engine, turning=turns_current(integrator)
-    )
+    program = RatesProgram(vessel.model, runs=runs, parameters=parameters, turning=turns_current(integrator))
     shares: int | Array = substeps
     if integrator == "rk4":
         shares = step_shares(vessel.responses, sample_time_s=vessel.sample_time_s, substeps=substeps)
@@ -123,7 +117,7 @@ def simulate_ensemble(
     steps_s = step_times(shares, vessel.sample_time_s)
     marching = partial(march, program, step=step, step_s=steps_s, substeps=len(steps_s))
     means = mean_weather(environment, runs, rng) if weather is None else weather
-    draw = partial(_stretches, vessel, environment, means, rng=rng, engine=engine)
+    draw = partial(_stretches, vessel, environment, means, rng=rng)
     states, seen = _sailed(vessel, program, given, _start(vessel, pose, velocity, runs), marching=marching, draw=draw)
     return Ensemble(
         sample_time_s=vessel.sample_time_s,
@@ -186,7 +180,7 @@ def _start(vessel: Vessel, pose: Any, velocity: Any, runs: int) -> Array:
 
 
 def _stretches(
-    vessel: Vessel, environment: Environment, mean: Array, noise: Array, *, rng: np.random.Generator, engine: str
+    vessel: Vessel, environment: Environment, mean: Array, noise: Array, *, rng: np.random.Generator
 ) -> Iterator[tuple[slice, Array]]:
     """Stretch after stretch of samples with its sea (k, 4, n); fills in the sensor noise (all samples, 8, n).
 
@@ -197,7 +191,7 @@ def _stretches(
     parts = [slice(first, min(first + STRETCH, samples)) for first in range(0, samples, STRETCH)]
     variations = (environment.current_variation, environment.wind_variation)
     before: list[Array | None] = [None, None]
-    draw = partial(_drawn, rng, spread, noise, engine)
+    draw = partial(_drawn, rng, spread, noise)
     with ThreadPoolExecutor(1) as thread:
         waiting = thread.submit(draw, slice(0, min(STRETCH, samples)))
         for part, later in zip(parts, [*parts[1:], slice(0, 0)], strict=True):
@@ -210,14 +204,10 @@ def _stretches(
             yield part, sea
 
 
-def _drawn(rng: np.random.Generator, spread: Array, noise: Array, engine: str, part: slice) -> Array:
+def _drawn(rng: np.random.Generator, spread: Array, noise: Array, part: slice) -> Array:
     """Standard normal numbers (k, 4, n) for the sea of a stretch; its sensor noise is filled in."""
     part_noise = noise[part]
     count, rows, runs = part_noise.shape
-    if engine == "numba":
-        sea = np.empty((count, 4, runs))
-        kernels()[1](rng, spread, sea, part_noise)
-        return sea
     drawn = rng.standard_normal((count, 4 + rows, runs))
     np.multiply(drawn[:, 4:], spread[:, None], out=part_noise)
     return drawn[:, :4]

@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from expdesign.errors import UnknownName
-from expdesign.simulation._numba import BINARY, OPERATIONS, kernels
 from expdesign.simulation.motion import Step, motion_rates, relative_velocity, rk4_step
 from expdesign.values import Array
 from expdesign.vessel import Operators, VesselModel
@@ -35,6 +33,8 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     "cos": math.cos,
 }
 """NumPy's name of each operation -> the same on plain numbers."""
+Code = tuple[Callable[..., object], tuple[int, ...]]
+"""A NumPy function, and the rows of memory of its operands and its result."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,6 @@ class RatesProgram:
         *,
         runs: int,
         parameters: Array | None = None,
-        engine: str = "numpy",
         turning: bool = True,
     ) -> None:
         """Write the equations down and set memory aside.
@@ -211,7 +210,6 @@ class RatesProgram:
         Args:
             runs: n.
             parameters: (p,) for all runs alike or (n, p), in the model's own form; None for the model's.
-            engine: "numpy", or "numba" which does the calls of a step in compiled code.
             turning: as of `motion_rates`.
         """
         theta = model.parameters if parameters is None else parameters
@@ -245,7 +243,6 @@ class RatesProgram:
         self._resting = [(place, getattr(np, x.name), x.arguments) for place, x in entries if x.arguments]
         self._own = int(own.sum())
         self._codes, rows, self._constants = self._laid_out([result.place for result in results])
-        self._engine = engine
         memory = np.zeros((rows, runs))
         for row, number in self._constants.items():
             memory[row] = number
@@ -268,7 +265,7 @@ class RatesProgram:
         first = self._first + self._own
         self._current = memory[first : first + len(self._held)]
         self._sums = np.empty((2, *self._state.shape))
-        self._run = prepared(self._codes, memory, self._constants, self._engine)
+        self._run = prepared(self._codes, memory, self._constants)
 
     def hold(self, inputs: Array) -> None:
         """Take delivered inputs (k, m, n); or of fewer runs, 1 or a divisor of n, that the others repeat in turn."""
@@ -322,8 +319,8 @@ class RatesProgram:
         read |= {result.place for result in results}
         return rested, sorted(place for place in rested & read if entries[place].name != "constant")
 
-    def _laid_out(self, results: list[int]) -> tuple[Array, int, dict[int, float]]:
-        """Operations as (operation, operand, operand, result) rows of memory, the number of rows, and constant rows.
+    def _laid_out(self, results: list[int]) -> tuple[list[Code], int, dict[int, float]]:
+        """Operations on rows of memory, the number of rows, and constant rows.
 
         A row is used again once nobody reads what it holds.
         """
@@ -332,7 +329,7 @@ class RatesProgram:
         where = {place: first + index for index, place in enumerate(self._held)}
         rows, constants = first + len(self._held), dict[int, float]()
         last = {argument: place for place in self._places for argument in entries[place].arguments}
-        codes, free, temporary = [], list[int](), set[int]()
+        codes, free, temporary = list[Code](), list[int](), set[int]()
         for place in self._places:
             entry = entries[place]
             if entry.name in begins:
@@ -350,29 +347,17 @@ class RatesProgram:
                     where[place], rows = rows, rows + 1
                 if place not in results:
                     temporary.add(place)
-                codes.append((OPERATIONS.index(entry.name), operands[0], operands[-1], where[place]))
+                codes.append((getattr(np, entry.name), (*operands, where[place])))
         for row, place in enumerate(results, start=self._out):
             if where[place] != row:
-                codes.append((OPERATIONS.index("positive"), where[place], where[place], row))
-        return np.array(codes), rows, constants
+                codes.append((np.positive, (where[place], row)))
+        return codes, rows, constants
 
 
-def prepared(codes: Array, memory: Array, constants: Mapping[int, float], engine: str) -> Callable[[], None]:
-    """A function that does the operations on the memory.
-
-    Raises:
-        UnknownName: no such engine.
-        InputError: numba is not installed.
-    """
-    if engine == "numba":
-        return kernels()[0](codes, memory)
-    if engine != "numpy":
-        raise UnknownName("engine", engine, known=("numpy", "numba"))
+def prepared(codes: Sequence[Code], memory: Array, constants: Mapping[int, float]) -> Callable[[], None]:
+    """A function that does the operations on the memory."""
     rows = [np.asarray(constants[row]) if row in constants else memory[row] for row in range(len(memory))]
-    calls = [
-        (getattr(np, OPERATIONS[code]), (rows[a], rows[b], rows[out]) if code in BINARY else (rows[a], rows[out]))
-        for code, a, b, out in codes.tolist()
-    ]
+    calls = [(call, [rows[row] for row in used]) for call, used in codes]
 
     def run() -> None:
         for call, arguments in calls:
