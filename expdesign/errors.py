@@ -81,12 +81,18 @@ class NotInformative(NoAnswer):
     Attributes:
         parameters: their names.
         unseen: combinations of parameters that the data do not show at all, name -> share in the parameter's own unit.
+        fix: those of the parameters that have to be known, for the data to show the others; () where nothing helps.
     """
 
     def __init__(
-        self, message: str, *, parameters: tuple[str, ...] = (), unseen: tuple[Mapping[str, float], ...] = ()
+        self,
+        message: str,
+        *,
+        parameters: tuple[str, ...] = (),
+        unseen: tuple[Mapping[str, float], ...] = (),
+        fix: tuple[str, ...] = (),
     ) -> None:
-        self.parameters, self.unseen = parameters, unseen
+        self.parameters, self.unseen, self.fix = parameters, unseen, fix
         super().__init__(message)
 
 

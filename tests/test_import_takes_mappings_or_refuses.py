@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import sys
 from pathlib import Path
 
@@ -13,9 +15,10 @@ from binary_logs import write_parquet, write_ulog
 from expdesign.cli import main
 from expdesign.importing import Run, Sampled, Stretch, cut_by_plan, file_name
 from expdesign.signals import Commands
-from imported_runs import columns_of, run_import
+from imported_runs import columns_of, notes_of, run_import
 from logged_trial import Voyage, logger_rows, voyage, write_dialect
 
+ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 
@@ -251,3 +254,27 @@ def test_logs_of_others_are_read(
     shown = capsys.readouterr()
     assert found == status if status is not None else found in (0, 3)
     assert told in shown.out + shown.err
+
+
+@pytest.mark.parametrize(("card", "held"), [("coaster-80m", "--fixed X_n1_astern"), ("", "logged-50m.toml")])
+def test_the_estimate_that_is_suggested_runs(
+    card: str, held: str, tmp_path: Path, trip: Voyage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    vessel = ROOT / "scenarios/vessels/logged-50m.toml"
+    if card:  # no run goes astern, which her model has a parameter for
+        main(["nominal", str(ROOT / f"scenarios/cards/{card}.toml"), "--out", str(tmp_path / "card"), "--quiet"])
+        vessel = tmp_path / "card/vessel.toml"
+    path = write_dialect(tmp_path / "a.csv", trip.every(10))
+    _, _, out = run_import(path, options=("--vessel", str(vessel)))
+    (command,) = re.findall(r"expdesign estimate [^<]*", (out / "import.html").read_text())
+    assert command.strip().endswith(held)
+    monkeypatch.chdir(tmp_path)
+    assert main([*shlex.split(command)[1:], "--method", "ls", "--quiet"]) == 0
+
+
+def test_no_estimate_is_suggested_where_there_is_none(tmp_path: Path) -> None:
+    short = write_dialect(tmp_path / "a.csv", voyage(parts=(("zigzag", 24.0),)).every(20))
+    vessel = ROOT / "scenarios/vessels/logged-50m.toml"
+    _, said, out = run_import(short, options=("--vessel", str(vessel), "--sample-time", "2"))
+    assert "no estimate can be had from these runs: the data have" in notes_of(said)
+    assert "expdesign estimate" not in (out / "import.html").read_text()

@@ -21,10 +21,12 @@ from expdesign.assessment.prior import PARAMETER_STD, apart_from_stated, check_p
 from expdesign.assessment.trials import Trial, Work, attempted, horizons_of, predictions_of, prefixed, starts_of, tried
 from expdesign.assessment.unstated import answers, current
 from expdesign.assessment.values import CONTINUOUS, HELD_OUT, Assessed, Assessment, Disturbances, EstimateOptions
-from expdesign.errors import InputError, NoAnswer
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind, tells_current
 from expdesign.estimation.excitation import EQUATION_WISE, check_excitation, worst_case
-from expdesign.estimation.methods import Method, method_for, method_named
+from expdesign.estimation.instrumental import Settings
+from expdesign.estimation.methods import Method, estimate, method_for, method_named
 from expdesign.estimation.output_error import ActuatorTime, Begun
 from expdesign.estimation.regression import CURRENT, STEADY
 from expdesign.estimation.replay import Integration
@@ -37,6 +39,7 @@ from expdesign.vessel import Vessel
 MOST_BY_ITSELF = 20_000  # samples, averaged, up to which output error is tried without being asked for
 # how long one method takes, predictions of what is left out and the decomposition, for the progress told
 METHOD_WORK, PREDICTION_WORK, DECOMPOSITION_WORK = 0.9, 0.9, 0.1
+FEWEST_SPARE = 10  # samples beyond the parameters of an equation, of which a standard deviation is known within 22 %
 NO_TESTS = Record(batches=())
 
 
@@ -86,6 +89,41 @@ def settled(
         raise prefixed(error, methods[0]) from None
 
 
+def _check_count(vessel: Vessel, record: Record, fixed: Sequence[str]) -> None:
+    """Raise NotInformative where an equation has hardly more samples than parameters: any noise is fitted then."""
+    for axis, equation in enumerate(OUTPUTS):
+        names = {term.name for term in vessel.model.terms if term.equation == equation} - set(fixed)
+        count = sum(int(np.isfinite(batch.velocity[:, axis]).sum()) for batch in record.batches)
+        if names and count < len(names) + FEWEST_SPARE:
+            raise NotInformative(
+                f"the data have {count} samples of {equation}, whose equation has {len(names)} parameters, expected "
+                f"{len(names) + FEWEST_SPARE} or more: fewer do not show how uncertain an estimate is",
+                parameters=tuple(sorted(names)),
+            )
+
+
+def to_fix(vessel: Vessel, record: Record) -> tuple[str, ...]:
+    """Parameters that have to be held for the data to have an estimate by least squares of all others.
+
+    Args:
+        record: with delivered inputs, as of `reduced`.
+
+    Raises:
+        InputError, NoAnswer: there is no estimate, whatever is held.
+    """
+    fixed: tuple[str, ...] = ()
+    while True:
+        try:
+            _check_count(vessel, record, fixed)
+            estimate(record, vessel.model, method="ls", settings=Settings(fixed=fixed))
+        except NotInformative as error:
+            if not error.fix or set(error.fix) & set(fixed):
+                raise
+            fixed = (*fixed, *error.fix)
+        else:
+            return fixed
+
+
 def assess(
     vessel: Vessel,
     record: Record,
@@ -106,12 +144,14 @@ def assess(
 
     Raises:
         InputError: the data lack what every method needs, or a name is unknown.
-        NotInformative: parameters that the data cannot separate; the message names them.
+        NotInformative: there are too few samples, or parameters that the data cannot separate; the message names them.
         Diverged: no stable model to make instruments with.
     """
     options = options or EstimateOptions()
     if options.prior == PARAMETER_STD:
         check_prior(vessel.model, vessel.name)
+    else:
+        _check_count(vessel, record, options.fixed)
     work = Work(vessel=vessel, stated=stated or vessel, record=record, options=options)
     names = dict.fromkeys(options.methods or default_methods(vessel, record))
     notes: tuple[str, ...] = ()

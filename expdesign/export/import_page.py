@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -28,6 +28,8 @@ from expdesign.vessel import response_keys, stem
 MOST_POINTS = 4000  # of a line in a figure
 MOST_TEXTS = 12
 DEGREES = 180.0 / np.pi
+VESSEL = "VESSEL.toml"
+"""Word for a vessel file that is not there yet."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +48,7 @@ class ImportContent:
     origin_s: float  # time of the first row that is written
     dated: bool  # whether it counts from 1970
     command: str  # to reproduce it
-    vessel: str  # file that was given, or a word for one
+    estimates: tuple[str, ...] = ()  # words behind `expdesign estimate FOLDER` that estimate from the runs; () for none
 
 
 def channel_table(content: ImportContent) -> Table:
@@ -210,7 +212,6 @@ def import_document(content: ImportContent, folder: Path) -> Document:
     """The import for people; its runs are in `folder`."""
     step = f"{content.sampled.sample_time_s:g} s"
     clocks = " ".join(f"{log.source}: {log.clock}." for log in content.logs)
-    steered = any(inputs_of(run.stretch.columns) for run in content.runs)
     sensors = [(key, f"{value:.4g}", words) for key, (value, words) in content.sensors.items()]
     parts = filled(
         section("Rejected", Table(header=("Where", "Why"), rows=content.rejected, texts=2)),
@@ -253,20 +254,22 @@ def import_document(content: ImportContent, folder: Path) -> Document:
                 ),
             ),
             *parts,
-            *(
-                [
-                    section(
-                        "Next",
-                        Listing((shlex.join(["expdesign", "estimate", str(folder), "--vessel", content.vessel]),)),
-                    )
-                ]
-                if steered
-                else []
-            ),
+            *filled(section("Next", *_next(content, folder))),
         ),
         notes=content.notes,
         command=content.command,
     )
+
+
+def _next(content: ImportContent, folder: Path) -> Iterator[Listing | str]:
+    """What to do with the runs."""
+    if not content.estimates:
+        return
+    yield Listing((shlex.join(["expdesign", "estimate", str(folder), *content.estimates]),))
+    if VESSEL in content.estimates:
+        yield f"{VESSEL} stands for the ship's file, which expdesign new or expdesign nominal makes."
+    if "--fixed" in content.estimates:
+        yield "The runs tell nothing of the parameters behind --fixed, which keep the values of the vessel file."
 
 
 def _thin(count: int) -> slice:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping as Table
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from expdesign.conventions import rotated
+from expdesign.conventions import listed, rotated
 from expdesign.errors import NoAnswer
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, Mapping
@@ -124,9 +125,9 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
         spans = "; ".join(f"{name} from {first:.0f} to {last:.0f} s" for name, (first, last) in ends.items())
         raise NothingToWrite(f"no stretch of {SHORTEST} samples is covered by all main columns: {spans}")
     held = {name: table[name].interval_s for name in table if table[name].interval_s > SAME * step_s}
-    for name, interval_s in held.items():
-        if name != VARIATION:
-            notes.append(f"{name} is read every {interval_s:.4g} s; the last reading is repeated in between")
+    written = dict.fromkeys(name for stretch in stretches for name in stretch.columns if name in table)
+    notes += _filled({name: table[name] for name in written}, stretches, step_s)
+    notes += _left_out({name: table[name] for name in main}, step_s)
     return Sampled(
         stretches=tuple(stretches), sample_time_s=step_s, notes=tuple(dict.fromkeys(notes)), held_s=held, channels=table
     )  # fmt: skip
@@ -138,6 +139,11 @@ def _origin(table: Table[str, Channel]) -> float:
 
 def _is_input(name: str) -> bool:
     return is_input(input_name(name))
+
+
+def _acts_on(name: str) -> bool:
+    """Whether a reading, as an order does, acts until the next one."""
+    return (_is_input(name) and not name.startswith(REACHED)) or name.startswith(PLANNED) or name in (STEERED, "batch")
 
 
 def _is_angle(name: str) -> bool:
@@ -270,12 +276,57 @@ def _step(table: Table[str, Channel]) -> float:
     return rate if abs(interval_s / rate - 1.0) < JITTER else float(f"{interval_s:.4g}")
 
 
+def _longest_gap_s(channel: Channel, step_s: float) -> float:
+    """Time between readings up to which the samples between them are filled."""
+    return max(GAP * channel.interval_s, GAP * step_s, LEAST_GAP_S)
+
+
+def _filled(table: Table[str, Channel], stretches: Sequence[Stretch], step_s: float) -> list[str]:
+    """Notes on columns that have no reading at some samples: how many, over which gaps, and what stands there."""
+    times = np.concatenate([stretch.time_s for stretch in stretches])
+    groups: dict[str, list[str]] = {}
+    for name, channel in table.items():
+        own = channel.time_s
+        later = np.clip(np.searchsorted(own, times + 1e-3 * step_s, side="right"), 1, len(own) - 1)
+        gaps = np.maximum(own[later], times) - own[later - 1]
+        near = np.minimum(np.abs(times - own[later - 1]), np.abs(own[later] - times)) < 0.5 * step_s
+        empty = ((gaps > SAME * step_s) | (times > own[-1])) & ~near & (times > own[0])
+        if not empty.any():
+            continue
+        repeats = _acts_on(name) or channel.interval_s > SAME * step_s
+        often = f"read every {channel.interval_s:.4g} s" if channel.interval_s > SAME * step_s else "missing in places"
+        how = "the last reading is repeated in between" if repeats else "a straight line is drawn in between"
+        most = f"over gaps of {gaps[empty].max():.3g} s at most, in {_percent(float(empty.mean()))} of the samples"
+        groups.setdefault(f"{often}; {how}, {most}", []).append(name)
+    return [f"{listed(names)} {'is' if len(names) == 1 else 'are'} {words}" for words, names in groups.items()]
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if share >= 0.01 else f"{share:.1%}" if share >= 0.001 else "less than 0.1%"
+
+
+def _left_out(main: Table[str, Channel], step_s: float) -> list[str]:
+    """Notes on where a record ends for gaps that are too long to be filled, by the columns that have them."""
+    groups: dict[tuple[float, ...], list[str]] = {}
+    for name, channel in main.items():
+        gaps = np.diff(channel.time_s)
+        if len(long := gaps[gaps > _longest_gap_s(channel, step_s)]):
+            groups.setdefault((len(long), float(long.min()), float(long.max())), []).append(name)
+    notes = []
+    for (count, shortest, longest), names in groups.items():
+        who = "all main columns" if len(names) == len(main) > 1 else listed(names)
+        size = f"{shortest:.3g} to {longest:.3g} s" if longest > 1.01 * shortest else f"{longest:.3g} s"
+        gap = f"{count} gaps of {size}" if count > 1 else f"a gap of {size}"
+        verb = "has" if len(names) == 1 else "have"
+        notes.append(f"{who} {verb} {gap}, too long to be filled: the record is cut there")
+    return notes
+
+
 def _covered(channels: list[Channel], step_s: float) -> list[tuple[float, float]]:
     """Times that all channels cover without a gap."""
     spans = [(-np.inf, np.inf)]
     for channel in channels:
-        longest = max(GAP * channel.interval_s, GAP * step_s, LEAST_GAP_S)
-        cuts = np.flatnonzero(np.diff(channel.time_s) > longest)
+        cuts = np.flatnonzero(np.diff(channel.time_s) > _longest_gap_s(channel, step_s))
         begins, ends = channel.time_s[np.r_[0, cuts + 1]], channel.time_s[np.r_[cuts, len(channel) - 1]]
         own = list(zip(begins.tolist(), ends.tolist(), strict=True))
         spans = _crossed(spans, own)
@@ -308,7 +359,7 @@ def _grid(table: Table[str, Channel], first: float, last: float, step_s: float) 
 
 
 def _covers(channel: Channel, times: Array, step_s: float) -> bool:
-    longest = max(GAP * channel.interval_s, GAP * step_s, LEAST_GAP_S)
+    longest = _longest_gap_s(channel, step_s)
     place = np.clip(np.searchsorted(channel.time_s, times), 1, max(len(channel) - 1, 1))
     if len(channel) < 2:
         return False
@@ -325,7 +376,7 @@ def _resampled(name: str, channel: Channel, times: Array, step_s: float) -> Arra
     ratio = channel.interval_s / step_s
     parts = math.ceil(1.0 / max(ratio, 1e-4)) if ratio < 1.0 / SAME else 1
     shares = (np.arange(parts) + 0.5) / parts
-    if (_is_input(name) and not name.startswith(REACHED)) or name.startswith(PLANNED) or name in (STEERED, "batch"):
+    if _acts_on(name):
         shift = EARLY * min(channel.interval_s, step_s) if parts == 1 else 0.0
         at = np.zeros(1) if parts == 1 else shares
         found = np.zeros(len(times))

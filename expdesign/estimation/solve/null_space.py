@@ -143,6 +143,7 @@ def require_informative(found: NullSpace) -> None:
         f"{' '.join(sorted(kept))}",
         parameters=names,
         unseen=tuple(direction.change for direction in found.unseen),
+        fix=tuple(sorted(kept)),
     )
 
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 
+import pyproj
 from lxml import etree
 
 from expdesign.errors import FileError
@@ -53,6 +54,9 @@ RANGES = {
 }
 """Attribute -> lowest value, highest, and whether the highest itself is allowed."""
 GEOMETRIES = ("Loxodrome", "Orthodrome")
+APART_M = 0.1  # below which two waypoints one after the other are at one place, where a leg has no course
+FASTEST_MPS = 60.0  # no vessel keeps a schedule that is faster
+WGS84 = pyproj.Geod(ellps="WGS84")
 TIMES = ("eta", "etd", "validityPeriodStart", "validityPeriodStop")
 
 
@@ -117,8 +121,10 @@ def _rtz_problems(root: etree._Element, file_stem: str, size: int) -> Iterator[s
     places: dict[str | None, int] = {}
     for number, waypoint in enumerate(waypoints):
         places.setdefault(waypoint.get("id"), number)
+    ways_m = _ways_m([waypoint.find(f"{{{space}}}position") for waypoint in waypoints])
+    yield from _at_one_place(ways_m, "waypoint")
     for schedule in root.iterfind(f"{{{space}}}schedules/{{{space}}}schedule/*"):
-        yield from _schedule(schedule, places)
+        yield from _schedule(schedule, places, ways_m)
 
 
 def _structure(element: etree._Element, space: str) -> Iterator[str]:
@@ -167,7 +173,39 @@ def _waypoints(waypoints: list[etree._Element], space: str, version: str) -> Ite
             yield f"waypoint id {one} is given {times} times, expected once"
 
 
-def _schedule(schedule: etree._Element, places: Mapping[str | None, int]) -> Iterator[str]:
+def _ways_m(points: Sequence[etree._Element | None]) -> list[float]:
+    """Shortest way from each point to the next [m]; nan where one is no place."""
+    places = [_place(point) for point in points]
+    return [
+        math.nan if one is None or two is None else float(WGS84.inv(one[1], one[0], two[1], two[0])[2])
+        for one, two in pairwise(places)
+    ]
+
+
+def _place(point: etree._Element | None) -> tuple[float, float] | None:
+    """Latitude and longitude [deg] of an element."""
+    try:
+        place = None if point is None else (float(point.get("lat", "")), float(point.get("lon", "")))
+    except ValueError:
+        return None
+    return place if place is not None and abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0 else None
+
+
+def _at_one_place(ways_m: Sequence[float], what: str) -> Iterator[str]:
+    for number, way_m in enumerate(ways_m, start=1):
+        if way_m < APART_M:
+            yield f"{what}s {number} and {number + 1} are at one place, so that the leg between them has no course"
+
+
+def _too_fast(begins: datetime, ends: datetime, way_m: float, what: str) -> Iterator[str]:
+    """The problem of a way that no vessel makes in time; a schedule that goes back in time is told elsewhere."""
+    seconds = (ends - begins).total_seconds()
+    if seconds >= 0.0 and way_m > APART_M and way_m > FASTEST_MPS * seconds:
+        speed = f"{way_m / seconds:.0f} m/s" if seconds else "no time"
+        yield f"{what}, {way_m / 1000:.4g} km in {seconds:g} s: {speed}, expected at most {FASTEST_MPS:g} m/s"
+
+
+def _schedule(schedule: etree._Element, places: Mapping[str | None, int], ways_m: Sequence[float]) -> Iterator[str]:
     elements = [e for e in schedule.iterchildren(etree.Element) if etree.QName(e).localname.endswith("heduleElement")]
     named = [element.get("waypointId") for element in elements]
     for one in named:
@@ -181,6 +219,14 @@ def _schedule(schedule: etree._Element, places: Mapping[str | None, int]) -> Ite
     for (before, one), (after, two) in pairwise(known):
         if two < one:
             yield f"schedule goes back in time, from {before} to {after}"
+    timed = [
+        (places[one], times)
+        for one, e in zip(named, elements, strict=True)
+        if one in places and (times := [t for key in ("eta", "etd") if (t := _moment(e.get(key, ""))) is not None])
+    ]
+    for (first, left), (last, reached) in pairwise(timed):
+        what = f"schedule goes from waypoint {first + 1} to {last + 1}"
+        yield from _too_fast(left[-1], reached[0], math.fsum(ways_m[first:last]), what)
 
 
 def _in_order(element: etree._Element, first: str, last: str) -> Iterator[str]:
@@ -229,3 +275,13 @@ def _gpx_problems(root: etree._Element) -> Iterator[str]:
             yield f"route {number} has an invalid time"
         if any(two < one for one, two in pairwise([time for time in times if time is not None])):
             yield f"route {number} goes back in time"
+        ways_m = _ways_m(points)
+        yield from _at_one_place(ways_m, f"route {number}: point")
+        timed = [
+            (place, moment)
+            for place, point in enumerate(points)
+            if (moment := _moment(point.findtext(f"{{{GPX}}}time", ""))) is not None
+        ]
+        for (first, left), (last, reached) in pairwise(timed):
+            what = f"route {number} goes from point {first + 1} to {last + 1}"
+            yield from _too_fast(left, reached, math.fsum(ways_m[first:last]), what)

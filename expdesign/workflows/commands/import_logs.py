@@ -12,10 +12,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from expdesign import requests
+from expdesign.assessment import to_fix
 from expdesign.conventions import OUTPUTS, whole_turns
-from expdesign.errors import FileError, InputError
+from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export.folder import Content, write_files
 from expdesign.export.import_page import (
+    VESSEL,
     ImportContent,
     earlier_files,
     import_document,
@@ -61,6 +63,7 @@ from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records, mirrored_heading
+from expdesign.reduction import reduced
 from expdesign.requests import repeating
 from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Batch, Record
@@ -145,7 +148,7 @@ def import_logs(request: requests.Import, *, progress: Progress = silent) -> Out
     progress("checking the runs", 0.75)
     with TemporaryDirectory(prefix="expdesign-") as scratch:
         within_s = within(progress, 0.75, 0.95)
-        tables, kept, rejected, more = _tried(runs, found, ship, mapping, size_m, Path(scratch), within_s)
+        tables, kept, rejected, record, more = _tried(runs, found, ship, mapping, size_m, Path(scratch), within_s)
         notes += more
         if not kept:
             places: dict[str, list[str]] = {}
@@ -158,11 +161,13 @@ def import_logs(request: requests.Import, *, progress: Progress = silent) -> Out
             none = NothingToWrite(f"no run of the record can be used. {why}")
             _leave_mapping(none, folder, mapping, read, notes, command)
             raise none
+        estimates, more = _estimates(request, ship, record)
+        notes += more
         content = ImportContent(
             logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(tables),
             rejected=tuple(rejected), followed=answers, sensors=sensors, notes=tuple(notes),
             origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
-            vessel=str(request.vessel or "VESSEL.toml"),
+            estimates=estimates,
         )  # fmt: skip
         progress("writing", 0.95)
         document = import_document(content, folder)
@@ -314,11 +319,11 @@ def _runs(found: Sampled, track: object, length_m: float) -> tuple[list[Run], li
 def _tried(
     runs: Sequence[Run], found: Sampled, ship: Vessel | None, mapping: Decisions, length_m: float, scratch: Path,
     progress: Progress,
-) -> tuple[dict[str, Path], list[Run], list[tuple[str, str]], list[str]]:  # fmt: skip
-    """The runs' files as other commands accept them, these runs with families, those refused, and notes."""
+) -> tuple[dict[str, Path], list[Run], list[tuple[str, str]], Record, list[str]]:  # fmt: skip
+    """The runs' files as other commands accept them, these runs with families, those refused, the data, and notes."""
     notes: list[str] = []
     if not runs:
-        return {}, [], [], []
+        return {}, [], [], Record(batches=()), []
     if not inputs_of(runs[0].stretch.columns):
         kept = [replace(run, name="track") for run in runs]
         tracks = {
@@ -328,7 +333,7 @@ def _tried(
             "no channel is an order or a position of a rudder or a propeller: the track is written as it is, and "
             "estimate and diagnose need such inputs"
         )
-        return tracks, kept, [], notes
+        return tracks, kept, [], Record(batches=()), notes
     taken = ship
     if ship is None:
         bow = bow_signals(mapping)
@@ -371,19 +376,33 @@ def _tried(
             f"instruments are compared with each other in {compared} of {len(kept)} runs, evenly over the log, as "
             f"its {rows} rows are more than are needed"
         )
+    whole = Record(batches=tuple(batches))
     if batches:
-        whole = Record(batches=tuple(batches))
         poses = [batch.pose for batch in batches if batch.pose is not None]
         if how := mirrored_heading(poses, found.sample_time_s):
             why = f"heading_rad: {how}, as the positions show; expected clockwise from north"
-            return {}, [], [("in all runs", f"{why}")], []
+            return {}, [], [("in all runs", f"{why}")], whole, []
         if ship is None:
             taken = fitted(taken, batches)
         doubts = checked(whole, taken).doubts
         if ship is None:
             doubts = tuple(_without_file(doubt) for doubt in doubts)
         notes += [*doubts, *(f"{_some(names, kept)}{note}" for note, names in said.items())]
-    return tables, kept, refused, notes
+    return tables, kept, refused, whole, notes
+
+
+def _estimates(request: requests.Import, ship: Vessel | None, record: Record) -> tuple[tuple[str, ...], list[str]]:
+    """Words that let `estimate` find an estimate from the runs, and why there is none."""
+    if not record.batches:
+        return (), []
+    if ship is None:
+        return ("--vessel", VESSEL), []
+    words = ("--vessel", str(request.vessel))
+    try:
+        fixed = to_fix(ship, reduced(checked(record, ship, undo=True), ship))
+    except (InputError, NoAnswer) as error:
+        return (), [f"no estimate can be had from these runs: {error}"]
+    return (*words, *(("--fixed", *fixed) if fixed else ())), []
 
 
 def _some(names: Sequence[str], runs: Sequence[Run]) -> str:
