@@ -49,7 +49,7 @@ def test_kinds_follow_from_thrusters_and_rudders() -> None:
         "offshore-45m": "azimuth",
         "naval-vessel": "twin-screw",
         "car-carrier": "twin-screw",
-    }
+    } | dict.fromkeys(("kvlcc2-model", "kcs-model", "esso-osaka-model"), "model-ship")
     assert kinds == dict.fromkeys(kinds, "propeller-rudder") | others
 
 

@@ -37,11 +37,11 @@ class New(Request):
 
     folder: Annotated[Path, Argument(metavar="NAME", help="The folder to make; also the scenario's name.")]
     kind: Annotated[
-        Literal["azimuth", "propeller-rudder", "twin-screw", "asv"] | None,
+        Literal["azimuth", "propeller-rudder", "twin-screw", "asv", "model-ship"] | None,
         Option(
             metavar="K",
-            help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv; what the card's thrusters are, or "
-            "azimuth, when not given.",
+            help="The kind of ship: azimuth, propeller-rudder, twin-screw, asv or model-ship; that of the card's "
+            "thrusters, or azimuth, when not given.",
         ),
     ] = None
     card: Annotated[

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from repeated import busy_s
 
-KINDS = ("azimuth", "propeller-rudder", "twin-screw", "asv")
+KINDS = ("azimuth", "propeller-rudder", "twin-screw", "asv", "model-ship")
 WIDE = 0.4
 NUMBERS = re.compile(r"^(\w+) = (\S+)$", flags=re.MULTILINE)
 

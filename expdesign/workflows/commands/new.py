@@ -41,9 +41,11 @@ KINDS = {
     "propeller-rudder": "a coaster of 80 m with one propeller and one rudder",
     "twin-screw": "a ship of 60 m with two propellers, two rudders and a tunnel thruster",
     "asv": "an unmanned craft of 2 m that steers by the difference of two propellers",
+    "model-ship": "a model ship of 3.2 m with one propeller and one rudder",
 }
 """Kind of ship -> what its template describes."""
 USUAL = "azimuth"
+MODEL_M = 8.0  # length below which a ship with one propeller and a rudder is taken for a free-running model
 BLOCK = "[[primitives]]"
 NUMBER = r"-?\d+\.\d+"
 PRIOR = """\
@@ -150,7 +152,9 @@ def kind_of(card: Card) -> str:
         return "azimuth"
     if not card.rudders:
         return "asv"
-    return "propeller-rudder" if len(card.drives) == 1 else "twin-screw"
+    if len(card.drives) > 1:
+        return "twin-screw"
+    return "model-ship" if card.hull.length_m < MODEL_M else "propeller-rudder"
 
 
 def of_card(name: str, kind: str, card: Card, *, command: str, progress: Progress = silent) -> Start:
