@@ -12,6 +12,7 @@ from expdesign.diagnosis.select.selection import Selection, Step
 from expdesign.diagnosis.select.starting_point import starting_point
 
 DEVIATION = np.ones((6, 3))
+RUNS = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])  # how six runs differ
 POSSIBLE = SimpleNamespace(is_possible=lambda _keys: True)
 
 

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -35,10 +36,24 @@ def voyages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
 
 
-def monitored(folder: Path, *words: object) -> dict[str, object]:
-    assert main(["monitor", *map(str, words), "--vessel", str(TENDER), "--out", str(folder), "--quiet"]) == 0
+def told_in(folder: Path) -> dict[str, object]:
     content: dict[str, object] = json.loads((folder / "monitor.json").read_text())
     return content
+
+
+def monitored(folder: Path, *words: object) -> dict[str, object]:
+    assert main(["monitor", *map(str, words), "--vessel", str(TENDER), "--out", str(folder), "--quiet"]) == 0
+    return told_in(folder)
+
+
+def rewritten(source: Path, target: Path, column: str, cell: Callable[[int, str], str]) -> Path:
+    """A log with other cells in a column, by the number of the row and what stands there."""
+    header, *rows = source.read_text().splitlines()
+    place, table = header.split(",").index(column), [row.split(",") for row in rows]
+    for number, row in enumerate(table):
+        row[place] = cell(number, row[place])
+    target.write_text("\n".join([header, *map(",".join, table)]) + "\n")
+    return target
 
 
 def ten_digits(content: object) -> object:
@@ -75,13 +90,12 @@ def watched(voyages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
 
 @pytest.fixture
 def no_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests that look at no page: drawing it takes longer than an hour's watch."""
     monkeypatch.setattr("expdesign.workflows.commands.monitor.document_html", lambda document: "")
 
 
-def told_in(folder: Path) -> dict[str, object]:
-    content: dict[str, object] = json.loads((folder / "monitor.json").read_text())
-    return content
+def without_page(test: Callable[..., None]) -> Callable[..., None]:
+    """A thorough test that looks at no page: drawing it takes longer than an hour's watch."""
+    return pytest.mark.thorough(pytest.mark.usefixtures("no_page")(test))
 
 
 @pytest.mark.thorough
@@ -109,8 +123,7 @@ def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_
     assert "Which manoeuvres reveal which change" in (watched / "monitor.html").read_text()
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_a_watch_that_is_resumed_loses_nothing_and_counts_nothing_twice(
     voyages: dict[str, Path], watched: Path, tmp_path: Path
 ) -> None:
@@ -158,8 +171,7 @@ def streamed(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *words: o
     return main(["monitor", "-", *map(str, words), "--vessel", str(TENDER), "--out", str(folder), "--quiet"])
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 @pytest.mark.parametrize("lines", [1999])
 @pytest.mark.parametrize("learning", [False, True])
 def test_a_watch_that_is_ended_by_force_goes_on_as_if_it_had_not_been(
@@ -191,15 +203,10 @@ def test_a_killed_watch_leaves_a_state_to_go_on_from(voyages: dict[str, Path], t
             time.sleep(0.05)
         process.kill()
     assert process.returncode == -signal.SIGKILL
-    assert (
-        main(["monitor", str(voyages["same"]), "--vessel", str(TENDER), "--resume", "--out", str(tmp_path), "-q"]) == 0
-    )
-    told = json.loads((tmp_path / "monitor.json").read_text())
-    assert told["judged_h"] > 1.0
+    assert monitored(tmp_path, voyages["same"], "--resume")["judged_h"] > 1.0
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_a_file_that_grows_is_read_on_from_where_it_ended(
     voyages: dict[str, Path], watched: Path, tmp_path: Path
 ) -> None:
@@ -214,8 +221,7 @@ def test_a_file_that_grows_is_read_on_from_where_it_ended(
     assert "log.csv: its first 3600 rows had been watched before" in again["notes"]
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_results_do_not_depend_on_the_number_of_processes(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -226,8 +232,7 @@ def test_results_do_not_depend_on_the_number_of_processes(
     assert table[0] == table[1]
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_notes_on_a_part_of_a_file_say_of_which_rows(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -246,8 +251,7 @@ def test_notes_on_a_part_of_a_file_say_of_which_rows(
     assert not any(note.startswith("log.csv: ") and "in all rows" in note for note in notes)
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_a_stream_is_watched_as_its_file_is(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -275,16 +279,11 @@ def test_the_example_of_the_readme_finds_the_change(
     assert alarm["effect"] == "theta:N_r"
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
-    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
-    names = header.strip().split(",")
-    for index in (100, 101, 2500):
-        cells = rows[index].strip().split(",")
-        cells[names.index("u_mps")] = "" if index == 100 else "NaN"
-        rows[index] = ",".join(cells) + "\n"
-    path = tmp_path / "gaps.csv"
+    none = {100: "", 101: "NaN", 2500: "NaN"}
+    path = rewritten(voyages["same"], tmp_path / "gaps.csv", "u_mps", lambda number, cell: none.get(number, cell))
+    header, *rows = path.read_text().splitlines(keepends=True)
     path.write_text(header + "".join(rows[:1500] + rows[2100:]))
     told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
     assert told["rows_without_numbers"] == 3
@@ -292,8 +291,7 @@ def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tm
     assert told["alarms"] == []
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_no_more_hours_are_judged_than_there_are(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
     kept = [row for number, row in enumerate(rows) if number % 45 > 2]  # a gap within every stretch
@@ -306,8 +304,7 @@ def test_no_more_hours_are_judged_than_there_are(voyages: dict[str, Path], tmp_p
     assert told["history"][-1]["time_s"] <= len(rows)
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_a_stream_resumed_from_its_own_log_judges_nothing_twice(
     voyages: dict[str, Path], watched: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -322,23 +319,14 @@ def test_a_stream_resumed_from_its_own_log_judges_nothing_twice(
         assert one["history"][-1]["time_s"] <= HOUR
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_times_are_those_of_the_datas_clock(voyages: dict[str, Path], tmp_path: Path) -> None:
-    header, *rows = voyages["changed"].read_text().splitlines(keepends=True)
-    begin_s, column = 1714564800, header.strip().split(",").index("time_s")
-    path = tmp_path / "dated.csv"
-    path.write_text(header + "".join(shifted(row, column, begin_s - HOUR) for row in rows))
+    begin_s, source = 1714564800, voyages["changed"]
+    path = rewritten(source, tmp_path / "dated.csv", "time_s", lambda _, cell: f"{float(cell) + begin_s - HOUR:.1f}")
     told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
     (alarm,) = told["alarms"]
     assert begin_s <= alarm["since_s"] < alarm["time_s"] <= begin_s + 3 * HOUR // 4
     assert any("Since 2024-05-01 12:" in sentence for sentence in told["verdict"])
-
-
-def shifted(row: str, column: int, later_s: float) -> str:
-    cells = row.strip().split(",")
-    cells[column] = f"{float(cells[column]) + later_s:.1f}"
-    return ",".join(cells) + "\n"
 
 
 @pytest.mark.parametrize("option", ["--size", "--false-alarm-days"])
@@ -382,9 +370,8 @@ def test_what_cannot_be_watched_is_refused_in_one_line(
 
 def test_the_state_of_another_program_is_refused(voyages: dict[str, Path], tmp_path: Path) -> None:
     (tmp_path / "monitor-state.json").write_text("{}")
-    assert (
-        main(["monitor", str(voyages["same"]), "--vessel", str(TENDER), "--out", str(tmp_path), "--resume", "-q"]) == 2
-    )
+    words = [str(voyages["same"]), "--vessel", str(TENDER), "--out", str(tmp_path), "--resume"]
+    assert main(["monitor", *words, "-q"]) == 2
 
 
 @pytest.mark.thorough
@@ -394,8 +381,7 @@ def test_the_reference_may_be_the_beginning_of_the_data(voyages: dict[str, Path]
     assert told["judged_h"] == pytest.approx(0.4, abs=0.05)
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path], tmp_path: Path) -> None:
     told = monitored(tmp_path, voyages["same"], voyages["reference"], "--reference", voyages["reference"])
     assert told["judged_h"] == pytest.approx(2.5, abs=0.05)
@@ -403,8 +389,7 @@ def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path
     assert told["history"][-1]["time_s"] > 3.4 * HOUR
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
     path = voyage_csv(tmp_path / "half.csv", tender(X_mu=0.5, Y_mu=0.5, N_mu=0.5), HOUR // 2, seed=9)
     told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
@@ -413,19 +398,14 @@ def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[st
     assert alarm["value"] == pytest.approx(-0.5, abs=max(5 * alarm["std"], 0.02))
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_data_unlike_the_reference_are_not_called_the_same_ship(voyages: dict[str, Path], tmp_path: Path) -> None:
-    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
-    column = header.strip().split(",").index("v_mps")
     rng = np.random.default_rng(1)
-    noisy = []
-    for row in rows:
-        cells = row.strip().split(",")
-        cells[column] = f"{float(cells[column]) + 0.2 * rng.standard_normal():.6g}"
-        noisy.append(",".join(cells) + "\n")
-    path = tmp_path / "noisy.csv"
-    path.write_text(header + "".join(noisy))
+
+    def noisy(_: int, cell: str) -> str:
+        return f"{float(cell) + 0.2 * rng.standard_normal():.6g}"
+
+    path = rewritten(voyages["same"], tmp_path / "noisy.csv", "v_mps", noisy)
     told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
     assert told["not_judged_h"] > 0.9
     assert told["alarms"] == []
@@ -439,8 +419,7 @@ def heavier(factor: float) -> Vessel:
     return tender(**{name: 1.0 / factor for name in names if name not in ("X_vr", "Y_ur")})
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 def test_another_load_after_a_port_call_is_a_remark_and_no_alarm(voyages: dict[str, Path], tmp_path: Path) -> None:
     loaded = voyage_csv(tmp_path / "loaded.csv", heavier(1.15), HOUR, seed=7, begin_s=9.0 * HOUR)
     both = [voyages["same"], loaded, "--reference", voyages["reference"]]
@@ -454,15 +433,15 @@ def test_another_load_after_a_port_call_is_a_remark_and_no_alarm(voyages: dict[s
     assert monitored(tmp_path / "none", *both, "--port-h", "inf")["alarms"]
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("no_page")
+@without_page
 @pytest.mark.parametrize("correction_s", [-2.0, -0.4, 0.4])
 def test_a_small_correction_of_the_clock_is_survived(
     voyages: dict[str, Path], watched: Path, tmp_path: Path, correction_s: float
 ) -> None:
-    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
-    column, path = header.strip().split(",").index("time_s"), tmp_path / "corrected.csv"
-    path.write_text(header + "".join([*rows[:1800], *(shifted(row, column, correction_s) for row in rows[1800:])]))
+    def corrected(number: int, cell: str) -> str:
+        return cell if number < 1800 else f"{float(cell) + correction_s:.1f}"
+
+    path = rewritten(voyages["same"], tmp_path / "corrected.csv", "time_s", corrected)
     told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
     assert told["judged_h"] == pytest.approx(told_in(watched)["judged_h"])
     assert told["alarms"] == []
