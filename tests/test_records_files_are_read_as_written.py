@@ -276,6 +276,18 @@ def test_files_share_the_notes_that_are_the_same(tmp_path: Path) -> None:
     assert load_records(paths).notes == ("a.csv and 2 more files: ignored leg",)
 
 
+@pytest.mark.parametrize("column", ["n1_rps", "rudder1_rad"])
+def test_a_position_in_one_file_and_a_command_in_another_is_told(tmp_path: Path, column: str) -> None:
+    data = motion()
+    other = {(f"reached_{name}" if name == column else name): values for name, values in data.items()}
+    paths = [write_trial(tmp_path / f"{name}.csv", own) for name, own in (("a", data), ("b", other), ("c", other))]
+    (note,) = load_records(paths).notes
+    assert note.startswith(
+        f"{column} is a position that was reached in b.csv and 1 more file, and a command in a.csv: "
+    )
+    assert load_records(paths[1:]).notes == load_records(paths[:1]).notes == ()
+
+
 def test_dead_sensors_and_idle_inputs_are_noted(tmp_path: Path) -> None:
     data = motion()
     record = loaded(tmp_path, data | {"wind_speed_mps": 0 * data["u_mps"] + 3, "n1_rps": 0 * data["u_mps"] + 5})

@@ -196,6 +196,7 @@ def load_records(
     batches: list[Batch] = []
     notes: dict[str, list[str]] = {}
     stands: dict[str, set[tuple[str, str]]] = {}  # column of an input -> its name and value in files, "" where it moves
+    reached: dict[str, list[str]] = {}  # column of an input -> files that have the position reached
     for path, name in files.items():
         table, origin = _read(path, inputs, origin, limits)
         clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
@@ -208,6 +209,9 @@ def load_records(
             notes.setdefault(note, []).append(name)
         for column in table.inputs:
             stands.setdefault(column, set()).add(_standing(table, column))
+        for column in inputs.columns:
+            if REACHED + column in table.columns:
+                reached.setdefault(column, []).append(name)
     idle: dict[str, list[str]] = {}  # value -> inputs that have it in all rows
     for levels in stands.values():
         (header, value), *others = levels
@@ -215,7 +219,16 @@ def load_records(
             idle.setdefault(value, []).append(header)
     still = tuple(f"{_listed([*files.values()])}: {_idle_note(headers, value)}" for value, headers in idle.items())
     told = tuple(f"{_listed(names)}: {note}" for note, names in notes.items())
-    return Record(batches=tuple(batches), notes=(*told, *still), idle=still)
+    mixed = tuple(_mixed_notes(reached, [*files.values()]))
+    return Record(batches=tuple(batches), notes=(*told, *mixed, *still), idle=still)
+
+
+def _mixed_notes(reached: Mapping[str, list[str]], files: list[str]) -> Iterator[str]:
+    """Inputs that are positions in some files and commands in others."""
+    for column, names in reached.items():
+        if others := [name for name in files if name not in names]:
+            where = f"was reached in {_listed(names)}, and a command in {_listed(others)}"
+            yield f"{column} is a position that {where}: one name in all files if one instrument wrote them"
 
 
 def _standing(table: Table, column: str) -> tuple[str, str]:

@@ -300,7 +300,8 @@ def with_delivered_inputs(
         return replace(record, notes=(*record.notes, note))
     batches = tuple(_delivered(batch, responses, standing, std) for batch in record.batches)
     notes = [*record.notes, *_slew_notes(record, {name: responses[name] for name in names})]
-    late = [name for name in names if not responses[name].follows and name not in record.batches[0].reached]
+    reached_in_all = set.intersection(*(set(batch.reached) for batch in record.batches))
+    late = [name for name in names if not responses[name].follows and name not in reached_in_all]
     if late:
         notes.append(
             f"As the vessel file states, commands of {', '.join(late)} act with lags, dead times, dead bands or "
@@ -313,10 +314,14 @@ def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[s
     """What the recorded values of signals with slew rates are taken for."""
     commands: dict[str, list[str]] = {}  # rate -> columns that are followed at it
     for name, response in responses.items():
-        if name in record.batches[0].reached:
-            yield f"reached_{column_name(name)} is used as measured; no rate, dead time, lag or dead band acts on it."
-        elif math.isfinite(response.rate):
-            moving = [batch for batch in record.batches if np.ptp(batch.inputs[:, batch.input_names.index(name)]) > 0]
+        commanded = [batch for batch in record.batches if name not in batch.reached]
+        if len(commanded) < len(record.batches):
+            count = len(record.batches) - len(commanded)
+            where = f" in {count} of {len(record.batches)} batches" if commanded else ""
+            acts = "no rate, dead time, lag or dead band acts on it"
+            yield f"reached_{column_name(name)} is used as measured{where}; {acts}."
+        if commanded and math.isfinite(response.rate):
+            moving = [batch for batch in commanded if np.ptp(batch.inputs[:, batch.input_names.index(name)]) > 0]
             kept = [acting_response(batch, name, response).rate == math.inf for batch in moving]
             column, rate = column_name(name), f"{response.rate:.3g} {RATE_UNITS[stem(name)]}"
             if not kept:
