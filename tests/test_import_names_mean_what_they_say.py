@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from expdesign.importing import Channel, Log, guess
-from expdesign.importing.names import marked
+from expdesign.importing.names import FOREIGN, marked
 
 TIME_S = np.arange(400.0)
 TURNING = 10.0 * np.sin(TIME_S / 20.0)
@@ -53,6 +55,42 @@ def test_a_name_means_what_a_seaman_reads_in_it(meant: str) -> None:
         if mark.is_actuator:
             assert mark.role == ("" if len(more) < 2 else more), name
             assert mark.machine == ("", more if len(more) == 1 else "", ""), name
+
+
+MACHINES = (
+    "Rudder",
+    "Azimuth",
+    "Shaft speed",
+    "Thruster 1",
+    "Bow thruster",
+    "Engine order",
+    "Thrust",
+    "Propeller speed",
+)
+
+
+@pytest.mark.parametrize("unit", FOREIGN)
+def test_what_is_in_the_unit_of_another_quantity_is_no_order_or_position(unit: str) -> None:
+    """A thrust in newtons was taken for the shaft speed that was reached, and used in its place."""
+    for machine in MACHINES:
+        assert marked(named(machine)).is_actuator, machine
+        assert not marked(named(f"{machine} [{unit}]")).column, machine
+        assert not marked(replace(named(machine), unit=unit)).column, machine
+    if unit.isalpha():
+        assert not marked(named(f"thrust1_{unit}")).column
+        assert not marked(named(f"rudder torque {unit}")).column
+        if len(unit) > 1:
+            assert not marked(named(f"thruster_{unit}")).column
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad", "%", "rpm", "1/min", "PS", "Hz", "A", "N"])
+def test_units_and_sides_of_orders_stay(unit: str) -> None:
+    kind = {"deg": "Rudder", "rad": "Azimuth", "PS": "Rudder", "A": "Rudder"}.get(unit, "Engine order")
+    assert marked(named(f"{kind} ({unit})")).is_actuator
+
+
+def named(name: str) -> Channel:
+    return Channel(source="a.csv", name=name, time_s=TIME_S, values=TURNING)
 
 
 PORT_POSITIVE = (
