@@ -293,7 +293,7 @@ def counted(chosen: argparse.Namespace) -> Iterator[str]:
             tasks: Iterator[tuple[Any, ...]] = ((number, chosen.seed) for number in range(chosen.first, chosen.trials))
             work = as_finished(triple, (chosen.data,), tasks)
         else:
-            places = [at for at, item in enumerate(FAULTS) if chosen.fault in (None, item.name)]
+            places = [at for at, item in enumerate(FAULTS) if not chosen.fault or item.name in chosen.fault]
             hulls = [name for name in HULLS if chosen.ship in (None, name)]
             tasks = (
                 (hull, at, number, chosen.seed)
@@ -325,7 +325,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--study", choices=("groups", "triples", "faults", "p-values"), default="groups")
     parser.add_argument("--trials", type=int, default=20, help="triples of runs, counted from 0")
     parser.add_argument("--first", type=int, default=0, help="number of the first triple")
-    parser.add_argument("--fault", choices=[item.name for item in FAULTS], help="only this one")
+    parser.add_argument("--fault", nargs="+", choices=[item.name for item in FAULTS], help="only these")
     parser.add_argument("--log", type=Path, help="file to add a line of JSON for each trial to")
     parser.add_argument("--table", type=Path, nargs="+", help="only compare these logs of faults")
     add_sharing(parser)

@@ -72,6 +72,11 @@ def _rudder(change: Callable[[Array], Array]) -> Callable[[Batch, np.random.Gene
     return changed
 
 
+def _one_engine(batch: Batch, _rng: np.random.Generator) -> Batch:
+    """The speed of the first of several engines, recorded too small."""
+    return replace(batch, inputs=batch.inputs * [GAIN if name == "n1" else 1.0 for name in batch.input_names])
+
+
 def _early(batch: Batch, _rng: np.random.Generator) -> Batch:
     """Inputs as commands that actuators follow after the delay: recorded that much earlier than they act."""
     return _ahead(batch, DELAY_S)
@@ -405,4 +410,8 @@ FAULTS = (
         record=("rudder1 moves evenly at", np.nan),
     ),
     Fault(name="orders late 1 s", batch=_behind, causes=("late_orders",), effects=(("lead:all", DELAY_S),)),
+    Fault(
+        name="one engine 0.9", batch=_one_engine, causes=("actuator_scale",), effects=(("scale:n1", 1 / GAIN - 1),),
+        needs="azimuth",
+    ),
 )  # fmt: skip

@@ -150,6 +150,7 @@ def pond_trial(data: Path, rng: np.random.Generator) -> Trial:
     names = [file.stem for file in sorted((data / POND.folder).glob("*.csv")) if file.stem.startswith(WINDY)]
     judged, unseen, fitted = divided(names, 3, 4, rng)
     vessel = best_vessel(POND, runs(POND, data, fitted[:8]))
+    unseen = (*unseen, *fitted[8:])
     return Trial(vessel=vessel, judged=read(data / POND.folder, judged), unseen=runs(POND, data, unseen))
 
 
