@@ -12,8 +12,7 @@ and asks for the right name first; what is found on untouched records must impro
 the model has terms of the wind and is fitted by output error: least squares alone leave up to three times its error in
 yaw. Oracles that know the fault say whether the records show it. `--log FILE` keeps a line of JSON for each trial, of
 this version or of another (copies of these four files in its folder), and `--table FILE ...` compares such files. Both
-studies say what they took (processor seconds), in Markdown. `--study p-values` tells those of all candidates on the
-untouched records of every ship, as the search begins.
+studies say what they took (processor seconds), in Markdown.
 """
 
 from __future__ import annotations
@@ -31,7 +30,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from clean_trials import p_values
 from diagnosis_real_faults import (
     AHEAD_S,
     FAULTS,
@@ -233,20 +231,6 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
     return row
 
 
-def told_p_values(data: Path, hulls: Sequence[str], numbers: Sequence[int], seed: int) -> Iterator[str]:
-    """A row per hull and trial: no fitted model is exact, so that they need not be uniform."""
-    yield "| hull | trial | candidates | p < 0.05 | p < 0.5 | smallest adjusted p |"
-    yield "|---|---|---|---|---|---|"
-    for hull in hulls:
-        for number in numbers:
-            trial = trial_of(hull, data, number, seed)
-            own = averaged(trial.judged if checked is None else checked(trial.judged, trial.vessel))
-            found, smallest = p_values(trial.vessel, own)
-            each = np.array([*found.values()])
-            shares = f"{(each < 0.05).mean():.2f} | {(each < 0.5).mean():.2f}"
-            yield f"| {hull} | {number} | {len(each)} | {shares} | {smallest:.2g} |"
-
-
 def promised(found: Diagnosis) -> list[tuple[str, float]]:
     """(output, least reduction of its error) of all findings together, of outputs that they improve for certain."""
     left: dict[str, float] = {}
@@ -322,7 +306,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--ship", choices=[POND.folder, TANK.folder, *HULLS], help="only this one; of --study faults a short name"
     )
     parser.add_argument("--seed", type=int, default=0, help="of all chance")
-    parser.add_argument("--study", choices=("groups", "triples", "faults", "p-values"), default="groups")
+    parser.add_argument("--study", choices=("groups", "triples", "faults"), default="groups")
     parser.add_argument("--trials", type=int, default=20, help="triples of runs, counted from 0")
     parser.add_argument("--first", type=int, default=0, help="number of the first triple")
     parser.add_argument("--fault", nargs="+", choices=[item.name for item in FAULTS], help="only these")
@@ -336,10 +320,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not all((chosen.data / case.folder).is_dir() for case in (POND, TANK)):
         sys.stdout.write(f"{chosen.data} lacks {POND.folder} or {TANK.folder}: nothing is measured\n")
         return 0
-    if chosen.study == "p-values":
-        hulls = [name for name in HULLS if chosen.ship in (None, name)]
-        lines = told_p_values(chosen.data, hulls, range(chosen.first, chosen.trials), chosen.seed)
-    elif chosen.study == "groups":
+    if chosen.study == "groups":
         cases = [case for case in (POND, TANK) if chosen.ship in (None, case.folder)]
         lines = (line for case in cases for line in told(case, tried(case, chosen.data, seed=chosen.seed)))
     else:
