@@ -48,7 +48,7 @@ def test_an_interruption_of_the_page_leaves_results_and_no_half_page(tmp_path: P
     def page() -> str:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt, match=r"out\.json are written, out\.html not"):
         write_files(tmp_path, {"out.html": page, "out.json": "{}"})
     assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
 

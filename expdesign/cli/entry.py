@@ -62,10 +62,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(error), WRONG_INPUT if isinstance(error, InputError) else NO_ANSWER)
     except typer.TyperException as error:
         return _fail(_usage(error), WRONG_INPUT)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         if argv is None:  # the process ends: pressed once more, Ctrl-C must not end in a traceback
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-        return _fail("interrupted, nothing half-written", INTERRUPTED)
+        said = f"{error}"  # what is written, where results are while their page is not
+        return _fail(f"interrupted; {said}" if said else "interrupted, nothing half-written", INTERRUPTED)
     except BrokenPipeError:
         return _reader_left()
     except OSError as error:

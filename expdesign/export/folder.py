@@ -111,6 +111,9 @@ def _write_pages(folder: Path, pages: Mapping[str, Callable[[], str]], results: 
         if results and isinstance(error, FileError):
             problem = f"{', '.join(pages)} {error.problem}; {', '.join(results)} are written"
             raise FileError(folder, "", problem) from None
+        if results and isinstance(error, KeyboardInterrupt):
+            names = ", ".join(results)
+            raise KeyboardInterrupt(f"{folder}: {names} are written, {', '.join(pages)} not") from None
         raise
     if not alone:
         raise FileError(folder, "", "another command wrote its results there meanwhile, expected a folder (--out) each")

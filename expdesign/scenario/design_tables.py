@@ -8,23 +8,34 @@ from pydantic import Field
 
 from expdesign.dictionary import FAMILIES
 from expdesign.growing import GrowSettings
-from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, Text, shown
+from expdesign.scenario.tables import (
+    Entry,
+    NonNegative,
+    Positive,
+    PositiveSpeed,
+    Speed,
+    Table,
+    Text,
+    YawRate,
+    shown,
+)
 
 # `[design.grow]`: the search for manoeuvres that add information to the dictionary.
 
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Speeds = Annotated[list[Speed], Field(min_length=2, max_length=2)]
+YawRates = Annotated[list[YawRate], Field(min_length=2, max_length=2)]
 
 
 class LimitsTable(Table):
     """Velocity limits of additions in calm water; the dictionary's range where not given."""
 
-    u_mps: Pair | None = Field(
+    u_mps: Speeds | None = Field(
         default=None, description="the lowest and highest surge speed [m/s]; the dictionary's range when not given"
     )
-    v_mps: Pair | None = Field(
+    v_mps: Speeds | None = Field(
         default=None, description="the lowest and highest sway speed [m/s]; the dictionary's range when not given"
     )
-    r_radps: Pair | None = Field(
+    r_radps: YawRates | None = Field(
         default=None, description="the lowest and highest yaw rate [rad/s]; the dictionary's range when not given"
     )
 
@@ -166,7 +177,7 @@ class DesignTable(Table):
     outcome_units: dict[str, Positive] = Field(
         default={}, description="the unit of error of an outcome; its nominal size when not given"
     )
-    outcome_speed_mps: Positive | None = Field(
+    outcome_speed_mps: PositiveSpeed | None = Field(
         default=None,
         description="the approach speed of the predicted standard trials [m/s]; at 85 % of power when not given",
     )

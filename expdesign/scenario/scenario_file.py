@@ -22,7 +22,20 @@ from expdesign.scenario.design_file import design_settings, named_files
 from expdesign.scenario.design_tables import DesignTable
 from expdesign.scenario.dictionaries import NAME, NAME_RULE, load_dictionary
 from expdesign.scenario.import_files import equipped_vessel
-from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, Text, check_table, read_toml, shown
+from expdesign.scenario.tables import (
+    Entry,
+    NonNegative,
+    Number,
+    Positive,
+    PositiveSpeed,
+    Speed,
+    Table,
+    Text,
+    YawRate,
+    check_table,
+    read_toml,
+    shown,
+)
 from expdesign.scenario.values import Scenario
 from expdesign.scenario.vessels import EnvironmentTable, build_environment
 from expdesign.sea_area import SeaArea
@@ -65,9 +78,11 @@ class PoseTable(Table):
 class StartTable(PoseTable):
     """`[start]`."""
 
-    u_mps: Number = Field(default=0.0, description="the speed ahead over ground with which the plan begins [m/s]")
-    v_mps: Number = Field(default=0.0, description="the speed to starboard over ground with which it begins [m/s]")
-    r_radps: Number = Field(default=0.0, description="the yaw rate with which it begins [rad/s], to starboard positive")
+    u_mps: Speed = Field(default=0.0, description="the speed ahead over ground with which the plan begins [m/s]")
+    v_mps: Speed = Field(default=0.0, description="the speed to starboard over ground with which it begins [m/s]")
+    r_radps: YawRate = Field(
+        default=0.0, description="the yaw rate with which it begins [rad/s], positive to starboard"
+    )
     commands: dict[str, Number] = Field(
         default_factory=dict,
         description="the actuator commands that stand as the plan begins, by column as in commands.csv, e.g. "
@@ -109,7 +124,7 @@ class PlanTable(Table):
         description="the work budget for other placements [s] on a usual computer; work is counted, not timed, so that "
         "every computer finds the same plan",
     )
-    transit_speed_mps: Positive | None = Field(
+    transit_speed_mps: PositiveSpeed | None = Field(
         default=PlanSettings.transit_speed_mps,
         description="the speed of repositioning legs through water [m/s]; when not given, nine tenths of the "
         "actuators' limit, or 97 % of it where design.accuracy asks for a short day",

@@ -26,6 +26,10 @@ MOST_NAMED = 240  # characters of all known names that are still listed beside t
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+FASTEST_MPS, FASTEST_RADPS = 100.0, 5.0  # no vessel goes or turns as fast
+Speed = Annotated[float, Field(ge=-FASTEST_MPS, le=FASTEST_MPS)]
+PositiveSpeed = Annotated[float, Field(gt=0, le=FASTEST_MPS)]
+YawRate = Annotated[float, Field(ge=-FASTEST_RADPS, le=FASTEST_RADPS)]
 Text = Annotated[str, Field(min_length=1)]
 
 

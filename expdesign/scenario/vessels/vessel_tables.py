@@ -29,16 +29,23 @@ from expdesign.vessel.quantities import ANGLE, NOT_NEGATIVE, NUMBER, POSITIVE, S
 
 WIND_LIMIT_MPS = 100.0
 CURRENT_LIMIT_MPS = 15.0
+MOST_STD_MPS = 15.0  # of a current or wind: forecasts are not worse
 
 
 class FlowTable(Table):
     """Uncertainty of a mean velocity, and its variation around the trial's mean."""
 
-    std_mps: NonNegative = Field(
-        default=0.0, description="the standard deviation of each component of a trial's mean [m/s]"
+    std_mps: float = Field(
+        default=0.0,
+        ge=0,
+        le=MOST_STD_MPS,
+        description="the standard deviation of each component of a trial's mean [m/s]",
     )
-    variation_std_mps: NonNegative = Field(
-        default=0.0, description="the standard deviation of the variation around that mean [m/s]"
+    variation_std_mps: float = Field(
+        default=0.0,
+        ge=0,
+        le=MOST_STD_MPS,
+        description="the standard deviation of the variation around that mean [m/s]",
     )
     correlation_s: NonNegative = Field(
         default=0.0, description="the correlation time of the variation [s]; 0 for a new value at every sample"
