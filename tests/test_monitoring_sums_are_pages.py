@@ -14,6 +14,7 @@ from expdesign.monitoring import TOLD_APART, Calibration, Rules, State, calibrat
 from expdesign.monitoring.calibration import ROUGHER
 from expdesign.monitoring.cusum import (
     ALIKE,
+    LOAD_SETTLED,
     SURELY,
     TUNED_TO,
     WEATHER_LIMIT,
@@ -26,7 +27,9 @@ from expdesign.monitoring.cusum import (
     _summed,
     _waited,
     estimates,
+    load_of,
     soonest,
+    with_load,
 )
 from expdesign.monitoring.force import Judged
 from expdesign.monitoring.state import Step
@@ -154,6 +157,22 @@ def test_sizes_since_the_watch_began_are_right_within_what_is_stated(calibration
     mean_square = float(np.mean(np.square(far)))
     assert 1.0 - 4.0 * math.sqrt(2.0 / 24) < mean_square < 1.0 + 4.0 * math.sqrt(2.0 / 24)
     assert abs(np.mean(far)) < 4.0 / math.sqrt(24)
+
+
+def test_a_load_that_is_taken_for_the_ships_is_counted_once(calibration: Calibration) -> None:
+    """What the filter holds of it moves to the ship; all of it, and nothing of the force."""
+    carried = np.arange(CHANGES) < 2
+    calibration = replace(calibration, load=carried)
+    state = State.begun(calibration, time_s=0.0)
+    forces = len(state.known.mean) - len(calibration.loads)
+    mean = np.r_[np.linspace(0.1, 0.3, forces), 1.5, -0.7]
+    load = replace(state.load, stay_s=3600.0, judged=LOAD_SETTLED[0])
+    state = replace(state, known=replace(state.known, mean=mean), load=load)
+    after = with_load(state, calibration)
+    assert after.known.mean[:forces] == pytest.approx(mean[:forces])
+    assert after.known.mean[forces:].tolist() == [0.0, 0.0]
+    assert after.shift[carried] - state.shift[carried] == pytest.approx(mean[forces:])
+    assert load_of(after, calibration)[0] == pytest.approx(load_of(state, calibration)[0])
 
 
 def test_time_without_a_stretch_lets_what_is_known_of_the_force_fade(calibration: Calibration) -> None:
