@@ -18,7 +18,7 @@ from expdesign.workflows.commands.new import KINDS
 
 TEMPLATES = Path(__file__).parents[1] / "expdesign" / "templates"
 SHIPS = {kind: load_vessel(TEMPLATES / kind / "vessel.toml") for kind in KINDS}
-SPEEDS = {"azimuth": 4.0, "twin-screw": 4.0, "propeller-rudder": 4.0, "asv": 1.2}
+SPEEDS = {"azimuth": 4.0, "twin-screw": 4.0, "propeller-rudder": 4.0, "asv": 1.2, "model-ship": 0.8}
 STRAIGHT = ("acceleration", "deceleration")
 SLOW = ("inward_spiral", "sway_step", "sway_zigzag", "turning_circle")  # motions within what the thrusters give
 AGILE = ("azimuth", "twin-screw")
