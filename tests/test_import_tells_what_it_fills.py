@@ -97,3 +97,11 @@ def test_a_pause_of_the_whole_log_is_no_gap_of_one_column() -> None:
     table = {name: Channel(name=name, source="a.csv", time_s=times.copy(), values=np.sin(times)) for name in COLUMNS}
     notes = sampled(table, Mapping(uses=(), files=())).notes
     assert notes == ("all main columns have a gap of 201 s, too long to be filled: the record is cut there",)
+
+
+@pytest.mark.parametrize(("speed_rps", "told"), [(2.0, False), (60.0, False), (180.0, True)])
+def test_a_shaft_speed_that_no_shaft_has_is_asked_about(speed_rps: float, told: bool) -> None:
+    times = np.arange(100.0)
+    values = {"u_mps": np.ones(100), "v_mps": np.zeros(100), "n1_rps": np.full(100, speed_rps)}
+    table = {name: Channel(name=name, source="a.csv", time_s=times, values=own) for name, own in values.items()}
+    assert ("is the channel in rpm" in " ".join(sampled(table, Mapping(uses=(), files=())).notes)) == told

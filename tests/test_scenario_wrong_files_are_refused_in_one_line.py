@@ -4,7 +4,14 @@ import pytest
 
 from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario import load_area, load_dictionary, load_scenario, load_vessel
-from scenario_files import spoil, write_scenario
+from expdesign.scenario.card_file import CardFile
+from expdesign.scenario.charts.zones import AreaTable
+from expdesign.scenario.dictionaries import DictionaryTable, LoadsFile
+from expdesign.scenario.import_files import InstrumentsFile, MappingFile
+from expdesign.scenario.scenario_file import ScenarioFile
+from expdesign.scenario.tables import Entry, check_table, read_toml
+from expdesign.scenario.vessels.vessel_tables import VesselTable
+from scenario_files import SCENARIOS, spoil, write_scenario
 
 SCENARIO_CASES = [
     ('name = "square"', "name = 3", "scenario.name", "is 3, expected text"),
@@ -296,3 +303,27 @@ def test_no_go_zones_over_everything_are_named_as_the_reason(tmp_path):
     )
     with pytest.raises(NoPlan, match="no-go zones cover all its water"):
         load_area(tmp_path / "area.toml", draught_m=2.5)
+
+
+EXAMPLES = {
+    "scenario": "harbour.toml", "vessel": "vessels/coaster-80m.toml", "dictionary": "dictionaries/standard.toml",
+    "area": "areas/bay.toml", "card": "cards/coaster-80m.toml", "loads": "loads/roll-trial.toml",
+}  # fmt: skip
+"""Kind of file -> an example of it."""
+FILES = {
+    "scenario": ScenarioFile, "vessel": VesselTable, "dictionary": DictionaryTable, "area": AreaTable, "card": CardFile,
+    "loads": LoadsFile, "mapping": MappingFile, "instruments": InstrumentsFile,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("given", EXAMPLES)
+@pytest.mark.parametrize("expected", FILES)
+def test_a_file_of_another_kind_is_called_one(expected: str, given: str) -> None:
+    """A scenario in place of the vessel was asked whether [scenario] should be [sensors]."""
+    path = SCENARIOS / EXAMPLES[given]
+    if given == expected:
+        check_table(FILES[expected], read_toml(path), Entry(path))
+        return
+    error = _refusal(lambda file: check_table(FILES[expected], read_toml(file), Entry(file)), path)
+    words = f"has the keys of a file of kind {given!r}, expected one of kind {expected!r}"
+    assert error.problem == f"{words} (see expdesign explain {expected})"

@@ -38,6 +38,7 @@ SAME = 1.5  # ratio of intervals within which two rates are the same
 GAP = 3.5  # intervals without a reading that are a gap
 LEAST_GAP_S = 1.5
 SHORTEST = 10  # samples of a stretch
+FASTEST_SHAFT_RPS = 100.0  # of thrusters of small craft; ships turn slower than 5
 COVERED = 0.98  # share of a stretch that a column beside the main ones must cover
 EARLY = 0.25  # share of a step by which a stamp may be late and the reading still belongs to that step
 FAST = 20.0  # degrees between readings from which a way through north may be an average
@@ -107,6 +108,12 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
     main = [name for name in table if name in MAIN or _is_input(name)]
     if not set(main) & (PLACES | {"u_mps", NORTHWARD}):
         raise NothingToWrite("the logs give neither positions nor velocities, expected one of them")
+    notes += [
+        f"{name} is up to {largest:.4g} revolutions per second, which is {60 * largest:.0f} rpm: is the channel in rpm "
+        "(unit in the mapping)?"
+        for name in main
+        if name.endswith("_rps") and (largest := float(np.abs(table[name].values).max())) > FASTEST_SHAFT_RPS
+    ]
     step_s = mapping.sample_time_s or _step(table)
     stretches = []
     for first, last in _covered([table[name] for name in main], step_s):

@@ -313,13 +313,13 @@ def with_delivered_inputs(
 def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[str]:
     """What the recorded values of signals with slew rates are taken for."""
     commands: dict[str, list[str]] = {}  # rate -> columns that are followed at it
+    measured_in: dict[str, list[str]] = {}  # in which batches -> columns of positions that were reached
     for name, response in responses.items():
         commanded = [batch for batch in record.batches if name not in batch.reached]
         if len(commanded) < len(record.batches):
             count = len(record.batches) - len(commanded)
             where = f" in {count} of {len(record.batches)} batches" if commanded else ""
-            acts = "no rate, dead time, lag or dead band acts on it"
-            yield f"reached_{column_name(name)} is used as measured{where}; {acts}."
+            measured_in.setdefault(where, []).append(f"reached_{column_name(name)}")
         if commanded and math.isfinite(response.rate):
             moving = [batch for batch in commanded if np.ptp(batch.inputs[:, batch.input_names.index(name)]) > 0]
             kept = [acting_response(batch, name, response).rate == math.inf for batch in moving]
@@ -337,6 +337,11 @@ def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[s
                     f"{column} changes no faster than {rate}, the stated rate, and is taken for the position{where}"
                     f"{still}. A position that was measured is best named reached_{column}."
                 )
+    for where, columns in measured_in.items():
+        verb, them = ("is", "it") if len(columns) == 1 else ("are", "them")
+        yield (
+            f"{listed(columns)} {verb} used as measured{where}; no rate, dead time, lag or dead band acts on {them}."
+        )
     for rate, columns in commands.items():
         one = len(columns) == 1
         yield (

@@ -118,9 +118,20 @@ def check_table(model: type[T], data: object, entry: Entry) -> T:
     try:
         return model.model_validate(data)
     except ValidationError as error:
+        if not entry.key and (other := _other_kind(model, data)):
+            kinds = f"has the keys of a file of kind {other!r}, expected one of kind {model.topic!r}"
+            raise entry.error(f"{kinds}{see(model.topic)}") from None
         problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
         key, text = _explain(model, problems[0])
         raise (entry.at(key) if key else entry).error(text) from None
+
+
+def _other_kind(model: type[Table], data: object) -> str:
+    """The topic of another kind of file that has all keys of this one; "" where these are the model's, or nobody's."""
+    if not model.topic or not isinstance(data, Mapping) or not data or set(data) <= set(model.fields()):
+        return ""
+    kinds = [kind for kind in Table.__subclasses__() if kind.topic not in ("", model.topic)]
+    return next((kind.topic for kind in kinds if set(data) <= set(kind.fields())), "")
 
 
 def shown(value: object) -> str:

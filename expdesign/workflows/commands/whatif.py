@@ -146,6 +146,10 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
             plan |= {"day_median_s": length.median_s, "day_95_s": length.most_s}
         comparing("comparing criteria", 0.0)
         return replace(_described(case, changes, information, design, plan, seed), track=track)
+    except FileError:
+        raise
+    except InputError as error:
+        raise InputError(f"{case.name}: {error}") from None
     except NoAnswer as error:
         empty = np.zeros((0, 0))
         return Case(
