@@ -57,7 +57,7 @@ SCENARIO_CASES = [
     ("clearance_m = 20.0", "clearance_m = 1e308", "plan.clearance_m", "is 1e+308, expected at most 1e+12"),
     ("confidence = 0.9", "confidence = 1", "plan.confidence", "is 1, expected less than 1"),
     ("confidence = 0.9", "aborted_most = 0.6", "plan.aborted_most", "is 0.6, expected at most 0.5"),
-    ("confidence = 0.9", "transit_speed_mps = 0", "plan.transit_speed_mps", "is 0, expected more than 0"),
+    ("confidence = 0.9", "transit_speed_mps = 0.01", "plan.transit_speed_mps", "is 0.01, expected at least 0.02"),
     ("[plan]", "[[plan]]", "plan", "is a list, expected a table"),
     ("[start]", "[start", "", "line 11"),
     ("[start]", "[design]", "", "is not valid TOML"),

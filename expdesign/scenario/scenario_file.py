@@ -45,6 +45,7 @@ from expdesign.vessel import Vessel, column_name
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 FILE_KEYS = {"scenario": ("vessel", "dictionary", "area"), "design": ("prior_data",)}
 """Keys that name files, relative to the file that contains them."""
+SLOWEST_MPS = 0.02  # of legs, which else last for days even in a model basin
 POSITION_KEYS = ("lat_deg", "lon_deg", "north_m", "east_m")
 
 
@@ -126,6 +127,7 @@ class PlanTable(Table):
     )
     transit_speed_mps: PositiveSpeed | None = Field(
         default=PlanSettings.transit_speed_mps,
+        ge=SLOWEST_MPS,
         description="the speed of repositioning legs through water [m/s]; when not given, nine tenths of the "
         "actuators' limit, or 97 % of it where design.accuracy asks for a short day",
     )
