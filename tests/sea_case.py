@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 HOUR = 3600
+BRAKED_S = 600
 INSIDE = 2  # steps of the integration in a second
 VALUES = {
     "X_uu": -0.004, "X_nn": 0.008, "X_vr": 1.2, "Y_uv": -0.02, "Y_ur": -0.3, "N_ur": -0.02, "N_ud": 0.0005,
@@ -119,7 +120,14 @@ CASES = {
 
 
 def sailed(
-    ships: Sequence[Ship], seconds: int, *, seeds: Sequence[int], sea: Sea = Sea(), since_s: int = 0
+    ships: Sequence[Ship],
+    seconds: int,
+    *,
+    seeds: Sequence[int],
+    sea: Sea = Sea(),
+    since_s: int = 0,
+    over_s: int = 0,
+    moored_s: tuple[int, int] = (0, 0),
 ) -> np.ndarray:
     """(voyages, samples, 9) measured columns `NAMES` of voyages, and two of `VANE` where the wind is measured.
 
@@ -129,6 +137,8 @@ def sailed(
         seeds: of each voyage.
         sea: of all.
         since_s: until then each is as in the file [s].
+        over_s: time that the change then takes [s].
+        moored_s: from when until when she lies at rest, with `BRAKED_S` before of no propeller and no helm.
     """
     drawn = [_drawn(seconds, np.random.default_rng(seed), sea) for seed in seeds]
     wanted, speed, waves, slow, noise = (np.stack(part, axis=-1) for part in zip(*drawn, strict=True))
@@ -147,24 +157,28 @@ def sailed(
     state[0] = 4.0
     rudder, felt, n = np.zeros(v), np.zeros((2, v)), speed[0]
     for sample in range(samples):
-        ship = later if sample >= since_s * sea.hz else before
-        moved = waves[sample]  # of surge, sway, yaw rate and heading
+        time_s = sample * step_s
+        share = float(np.clip((time_s - since_s) / over_s, 0.0, 1.0)) if over_s else float(time_s >= since_s)
+        ship = {name: (1.0 - share) * before[name] + share * later[name] for name in later}
+        moored, braked = (moored_s[0] - ahead_s <= time_s < moored_s[1] for ahead_s in (0, BRAKED_S))
+        moved = waves[sample] * (not moored)  # of surge, sway, yaw rate and heading
         told = state[[3, 4, 5, 0, 1, 2]].copy()
         told[2:] += moved[[3, 0, 1, 2]]
         told[5] *= ship["gyro"]
         told += noise[sample]
         felt = told[[2, 5]]
         turn = np.clip(wanted[sample] - felt[0], -0.5, 0.5)
-        order = np.clip(sea.helm[0] * turn - sea.helm[1] * felt[1], -0.5, 0.5)
+        order = np.clip(sea.helm[0] * turn - sea.helm[1] * felt[1], -0.5, 0.5) * (not braked)
         begun = rudder
         rudder = rudder + np.clip(order - rudder, -0.05 * step_s, 0.05 * step_s)
-        n = n + np.clip(speed[sample] - n, -0.05 * step_s, 0.05 * step_s)
+        n = n + np.clip(speed[sample] * (not braked) - n, -0.05 * step_s, 0.05 * step_s)
         felt_air = _vane(state, air[sample], vane[sample]) if sea.wind.measured else ()
         table[sample] = np.stack([np.full(v, sample * step_s), *told, n, (begun + rudder) / 2, *felt_air])
         for part in range(INSIDE):
             angle = begun + (rudder - begun) * (part + 0.5) / INSIDE + ship["rudder_rad"]
             push = slow[sample] + _blown(state, air[sample])
             state = _stepped(state, angle, n, push, ship, step_s / INSIDE)
+            state[:3] *= not moored
     return np.moveaxis(table, 2, 0)
 
 

@@ -363,6 +363,40 @@ def states(loaded: Calibration) -> Iterator[tuple[str, MonitorContent]]:
 
 
 @pytest.mark.usefixtures("undrawn_here")
+@pytest.mark.parametrize("change", [(2.0, 2.0, 2.0, 0.0), (0.0, 0.0, 3.0, 0.0), (0.0, 0.0, 0.0, 2.0)])
+def test_another_load_is_told_as_one_cause_where_it_explains_more_than_a_change(
+    calibration: Calibration, change: tuple[float, ...]
+) -> None:
+    heavier = replace(calibration, heavier=np.array([1.0, 1.0, 1.0, 0.0]))
+    grams = drawn_grams(120, seed=6, change=np.array(change), since=60)
+
+    def again(shift: np.ndarray, since_s: float) -> Grams:
+        after = np.eye(grams.products.shape[-1])
+        after[:CHANGES, -1] = -shift
+        return replace(grams, products=after.T @ grams.products @ after)
+
+    limit = threshold(CHANGES, 1e4)
+    state, alarms, steps, _ = watch(
+        heavier, State.begun(heavier, time_s=0.0), grams, rules=Rules(limit=limit), again=again
+    )
+    content = content_of(heavier, (state, alarms, steps), limit)
+    alarm = content.found[-1]
+    assert restored(Alarm, json.loads(json.dumps(saved(alarm)))) == alarm
+    told, page, _ = told_of(content)
+    alike = 0.0 < change[0] == change[1]
+    if alike:
+        assert alarm.loaded is not None
+        gain, value, std = alarm.loaded
+        assert gain > AS_LIKELY
+        assert abs(value - change[0]) < 4.0 * std
+        assert "has changed, or the wind, which is not measured: another load, mass and inertia by +" in told
+        assert "or, explaining the data less well, parameter p" in told
+    else:
+        assert alarm.loaded is None
+    assert ("another load, mass" in told) == ("another load, mass" in page) == alike
+
+
+@pytest.mark.usefixtures("undrawn_here")
 def test_the_ship_has_changed_only_by_an_alarm_and_the_same_only_where_nothing_else_is_said(
     loaded: Calibration,
 ) -> None:

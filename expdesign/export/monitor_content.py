@@ -96,6 +96,15 @@ def size_in_words(content: MonitorContent, alarm: Alarm) -> str:
     return change.in_words(alarm.value * change.size, alarm.std * change.size)
 
 
+def load_in_words(content: MonitorContent, alarm: Alarm) -> str:
+    """Another load that explains an alarm's data as well as its change, in words; nothing where there is none."""
+    if alarm.loaded is None:
+        return ""
+    change = content.changes[int(np.argmax(content.calibration.heavier))]
+    _, value, std = alarm.loaded
+    return f"another load, mass and inertia by {change.in_words(value * change.size, std * change.size)}"
+
+
 def sentences(content: MonitorContent) -> tuple[str, ...]:
     """The verdict."""
     return (*_sentences(content), *watch_sentences(content.roll, false_alarm_days=content.false_alarm_days))
@@ -260,6 +269,13 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     statistic, limit = told_apart(alarm.statistic, content.limit)
     whose = "a sensor" if change.effect == GYRO else "the ship"
     own, who = f"{change.words} by {size_in_words(content, alarm)}", f"{whose} has changed"
+    if load := load_in_words(content, alarm):
+        likelier = alarm.loaded is not None and alarm.loaded[0] > AS_LIKELY
+        own = (
+            f"{load}, or, explaining the data less well, {own}"
+            if likelier
+            else f"{own}, or {load}, which explains the data as well"
+        )
     if _may_be_wind(content, alarm):
         who += ", or the wind, which is not measured"
     if alarm.pushes:
@@ -436,6 +452,14 @@ def _call_entry(content: MonitorContent, call: Call) -> dict[str, object]:
     }
 
 
+def _load_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object] | None:
+    if alarm.loaded is None:
+        return None
+    gain, value, std = alarm.loaded
+    size = content.changes[int(np.argmax(content.calibration.heavier))].size
+    return {"value": value * size, "std": std * size, "likelier": gain > AS_LIKELY}
+
+
 def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
     change = content.changes[alarm.change]
     return {
@@ -445,6 +469,7 @@ def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
         "std": alarm.std * change.size,
         "in_words": f"{change.words} by {size_in_words(content, alarm)}",
         "as_likely": [content.changes[number].effect for number in alarm.as_likely],
+        "as_likely_load": _load_entry(content, alarm),
         "as_likely_pushes": pushed(content, alarm),
         "likelier_pushes": pushed(content, alarm, beyond=AS_LIKELY),
     }

@@ -163,20 +163,14 @@ def _simulated(state: State, calibration: Calibration, again: Again | None, rule
     gain = _gains(score + information @ so_far, information, calibration, alarm)  # of each in place of the one so far
     causes = [k for k in np.argsort(-gain).tolist() if gain[k] > gain.max() - MAY_BE][:CAUSES]
     causes = [alarm.change] if alarm.named else list(dict.fromkeys([*causes, alarm.change]))
-    told = dict[int, Told]()
+    told, units = dict[int, Told](), np.eye(len(so_far))
+    since = score + information @ so_far, information
     for cause in causes:
-        size = (score + information @ so_far)[cause] / information[cause, cause]
-        for _ in range(ROUNDS):
-            one = gone_over(state, calibration, again, rules, cause, float(size))
-            if one is None:
-                return state
-            told[cause] = one
-            s, i = beside_baseline(one.sums, calibration)
-            step = s[cause] / i[cause, cause]
-            size = one.shift[cause] - state.before[cause] + step
-            if abs(step) * math.sqrt(i[cause, cause]) < CLOSE:
-                break
-    likely = {cause: -_cost(one, cause, calibration) / 2.0 for cause, one in told.items()}
+        one = _sized(state, calibration, again, rules, units[cause], since)
+        if one is None:
+            return state
+        told[cause] = one
+    likely = {cause: -_cost(one, units[cause], calibration) / 2.0 for cause, one in told.items()}
     best, *rest = sorted(likely, key=lambda cause: -likely[cause])
     state = replace(
         state.with_known(told[best].known),
@@ -188,31 +182,66 @@ def _simulated(state: State, calibration: Calibration, again: Again | None, rule
     if alarm.named:
         return replace(state, alarm=alarm)
     others = tuple(cause for cause in rest if likely[cause] > likely[best] - AS_LIKELY)
-    pushes = _pushes(gone_over(state, calibration, again, rules, None, 0.0), calibration, likely[best])
-    return replace(state, alarm=replace(alarm, as_likely=others, pushes=pushes))
+    pushes = _pushes(gone_over(state, calibration, again, rules, None), calibration, likely[best])
+    loaded = _loaded(
+        _sized(state, calibration, again, rules, calibration.heavier, since), state, calibration, likely[best]
+    )
+    unexplained = alarm.unexplained - max(loaded[0] if loaded else 0.0, 0.0)
+    alarm = replace(alarm, as_likely=others, pushes=pushes, loaded=loaded, unexplained=max(unexplained, 0.0))
+    return replace(state, alarm=alarm)
+
+
+def _sized(
+    state: State, calibration: Calibration, again: Again, rules: Rules, along: Array, since: tuple[Array, Array]
+) -> Told | None:
+    """The data since the alarm's change, with the ship changed along (m,) by the size that they tell.
+
+    None where they are not at hand, or the direction is none. `since` are score (m,) and information (m, m) that the
+    size begins with.
+    """
+    score, information, size, told = *since, 0.0, None
+    for _ in range(ROUNDS * bool(along.any())):
+        size += float(along @ score / (along @ information @ along))
+        told = gone_over(state, calibration, again, rules, size * along)
+        if told is None:
+            return None
+        score, information = beside_baseline(told.sums, calibration)
+        if abs(along @ score) < CLOSE * math.sqrt(along @ information @ along):
+            break
+    return told
+
+
+def _loaded(
+    told: Told | None, state: State, calibration: Calibration, likely: float
+) -> tuple[float, float, float] | None:
+    """Another load since the change, where it explains the data as well as the best cause, see `Alarm.loaded`."""
+    along = calibration.heavier
+    if told is None or (gain := -_cost(told, along, calibration) / 2.0 - likely) < -AS_LIKELY:
+        return None
+    score, information = beside_baseline(told.sums, calibration)
+    known = float(along @ information @ along)
+    value = float(along @ (told.shift - state.before) / (along @ along) + along @ score / known)
+    std = 1.0 / math.sqrt(known)
+    return (gain, value, std) if abs(value) > VANISHED * std else None
 
 
 def _pushes(told: Told | None, calibration: Calibration, likely: float) -> tuple[tuple[int, float], ...]:
     """Steady accelerations since the change that explain the data as well as the best cause, see `Alarm.pushes`."""
     if told is None:
         return ()
-    first = len(told.shift)
-    gains = [-_cost(told, place, calibration) / 2.0 - likely for place in range(first, told.sums.score.shape[1])]
+    units = np.eye(told.sums.score.shape[1])[len(told.shift) :]
+    gains = [-_cost(told, unit, calibration) / 2.0 - likely for unit in units]
     return tuple((axis, gain) for axis, gain in enumerate(gains) if gain > -AS_LIKELY)
 
 
-def gone_over(
-    state: State, calibration: Calibration, again: Again, rules: Rules, cause: int | None, size: float
-) -> Told | None:
-    """The data since the alarm's change, with the ship changed by a cause alone; None where they are not at hand.
+def gone_over(state: State, calibration: Calibration, again: Again, rules: Rules, change: Array | None) -> Told | None:
+    """The data since the alarm's change, with the ship changed by (m,) alone; None where they are not at hand.
 
-    Without a cause the ship is as before, and steady accelerations stand as further changes behind those of the ship.
+    Without a change the ship is as before, and steady accelerations stand as further changes behind those of the ship.
     """
     assert state.pending is not None
     sums, m = state.pending, len(state.shift)
-    shift = state.before.copy()
-    if cause is not None:
-        shift[cause] += size
+    shift = state.before if change is None else state.before + change
     grams = again(shift, float(sums.since_s[0]))
     first, last = np.searchsorted(grams.time_s, [sums.since_s[0] - 1e-6, state.until_s - 1e-6]).tolist()
     if not first < last or grams.time_s[0] > sums.since_s[0] + 1e-6:
@@ -223,7 +252,7 @@ def gone_over(
     heading = float(sums.known_heading[0])
     known = Known(mean=sums.mean[0], covariance=sums.covariance[0])
     columns = np.arange(stretches.products.shape[-1])
-    pushes = columns[:0] if cause is not None else columns[-1 - grams.pushes : -1]
+    pushes = columns[:0] if change is not None else columns[-1 - grams.pushes : -1]
     columns, among = np.r_[:m, pushes, m : len(columns)], m + len(pushes)
     begun = Sums.begun(1, among, known, float(sums.since_s[0]), sums.rougher[0])
     sums = replace(begun, known_s=sums.known_s, known_heading=sums.known_heading)
@@ -261,11 +290,12 @@ def fits(one: Judged, count: float, calibration: Calibration, *, changed: bool) 
     return misfit <= calibration.misfit_limit + unlinear
 
 
-def _cost(told: Told, cause: int, calibration: Calibration) -> float:
-    """Squared errors at the size of a cause that leaves the least, and at the best baseline for it."""
+def _cost(told: Told, along: Array, calibration: Calibration) -> float:
+    """Squared errors at the size of a change along (m,) that leaves the least, and at the best baseline for it."""
     score, information = beside_baseline(told.sums, calibration)
     by_baseline = told.sums.score[0] / calibration.common @ _baseline(calibration, len(score)) @ score
-    return told.cost / calibration.common - float(by_baseline) - float(score[cause] ** 2 / information[cause, cause])
+    by_change = (along @ score) ** 2 / (along @ information @ along)
+    return told.cost / calibration.common - float(by_baseline) - float(by_change)
 
 
 def beside_baseline(pending: Sums, calibration: Calibration) -> tuple[Array, Array]:

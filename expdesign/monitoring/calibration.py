@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from expdesign.errors import NotInformative
-from expdesign.monitoring.changes import Change
+from expdesign.monitoring.changes import INERTIA, Change
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
 from expdesign.monitoring.force import (
     Force,
@@ -94,6 +94,7 @@ class Calibration:
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
+    heavier: Array  # (m,) what more mass changes, in sizes: the inertia of every equation alike; zero where it is one
     wanted: Array  # (m,) one for changes that are watched for where they can be, zero for those that are learnt only
     shoal_limit: float  # draught over depth beyond which the water is shallower than the reference's
     air: tuple[int, ...]  # numbers of the changes that act by the measured wind
@@ -218,6 +219,7 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
         weights=weights,
         surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
         load=np.array([change.load for change in changes]) if changes else np.zeros(m),
+        heavier=_heavier(changes, m),
         wanted=np.array([float(change.watched) for change in changes]) if changes else np.ones(m),
         shoal_limit=float(grams.shoal.max()) + SHOALER,
         air=tuple(air.tolist()),
@@ -227,6 +229,12 @@ def calibrate(grams: Grams, *, changes: Sequence[Change] = ()) -> Calibration:
     own = found.baseline_covariance[np.ix_(air, air)]
     leverage = np.einsum("wij,ij->w", information[:, air[:, None], air], own)
     return replace(found, wind_limit=WINDS_REACH * float(leverage.max())) if len(air) else found
+
+
+def _heavier(changes: Sequence[Change], count: int) -> Array:
+    """(count,) of `Calibration.heavier`."""
+    own = np.array([float(change.effect.startswith(INERTIA)) for change in changes])
+    return own if own.sum() > 1.0 else np.zeros(count)
 
 
 def misfit_of(quadratic: float, score: Array, information: Array, count: float) -> float:

@@ -21,6 +21,7 @@ LOADS = (("inertia", 2.0), ("hull", 1.0))
 
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
+INERTIA = "inertia:"  # of the effects that another mass changes alike, one for each equation
 
 AIR_TERMS = (
     Term("u", "W_abs_u_u", "abs(u_q)*u_q"),
@@ -105,7 +106,7 @@ def watched_changes(ship: ExtendedModel, *, size: float = RELATIVE_SIZE, wind: b
     ]  # fmt: skip
     changes += [
         Change(
-            effect=f"inertia:{name}", size=size, unit=(0.01, "%"), words=f"inertia in {EQUATIONS[name]}", whole=1.0,
+            effect=f"{INERTIA}{name}", size=size, unit=(0.01, "%"), words=f"inertia in {EQUATIONS[name]}", whole=1.0,
             load=loads["inertia"],
         )
         for name in model.outputs

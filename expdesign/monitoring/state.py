@@ -28,6 +28,9 @@ class Alarm:
     # steady accelerations since then, of the modelled ones of surge, sway and yaw by number, that explain them as well
     # without a change of the ship, each with its log-likelihood over that of the change
     pushes: tuple[tuple[int, float], ...] = ()
+    # another load since then, as much more inertia in every equation, where it explains them as well: its
+    # log-likelihood over that of the change, its size and the standard error
+    loaded: tuple[float, float, float] | None = None
     unexplained: float = 0.0  # log-likelihood that all changes together gain beyond the best one
     named: bool = False  # the change was named, and its size is being refined
     settled: bool = False  # its size, too, is as sure as it is going to be, and the watch goes on from the changed ship
