@@ -363,12 +363,15 @@ def states(loaded: Calibration) -> Iterator[tuple[str, MonitorContent]]:
 
 
 @pytest.mark.usefixtures("undrawn_here")
+@pytest.mark.parametrize("gap_s", [0.0, 600.0])
 @pytest.mark.parametrize("change", [(2.0, 2.0, 2.0, 0.0), (0.0, 0.0, 3.0, 0.0), (0.0, 0.0, 0.0, 2.0)])
 def test_another_load_is_told_as_one_cause_where_it_explains_more_than_a_change(
-    calibration: Calibration, change: tuple[float, ...]
+    calibration: Calibration, change: tuple[float, ...], gap_s: float
 ) -> None:
+    """Also where it came while there were no data: the alarm is of what follows, and all of that is at hand."""
     heavier = replace(calibration, heavier=np.array([1.0, 1.0, 1.0, 0.0]))
     grams = drawn_grams(120, seed=6, change=np.array(change), since=60)
+    grams = replace(grams, time_s=grams.time_s + gap_s * (np.arange(120) >= 60))
 
     def again(shift: np.ndarray, since_s: float) -> Grams:
         after = np.eye(grams.products.shape[-1])
@@ -383,6 +386,7 @@ def test_another_load_is_told_as_one_cause_where_it_explains_more_than_a_change(
     alarm = content.found[-1]
     assert restored(Alarm, json.loads(json.dumps(saved(alarm)))) == alarm
     told, page, _ = told_of(content)
+    assert alarm.since_s in grams.time_s
     alike = 0.0 < change[0] == change[1]
     if alike:
         assert alarm.loaded is not None

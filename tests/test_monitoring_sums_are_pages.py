@@ -181,7 +181,7 @@ def test_time_without_a_stretch_lets_what_is_known_of_the_force_fade(calibration
         calibration, State.begun(calibration, time_s=0.0), drawn_grams(20, seed=3), rules=Rules(limit=99.0)
     )
     gap_s = 500.0
-    later = _waited(replace(state, heading=1.0), calibration, state.until_s + gap_s, 1.0)
+    later = _waited(replace(state, heading=1.0), calibration, state.until_s + 440.0, state.until_s + gap_s, 1.0)
     keep = calibration.nuisance.memory(gap_s, 0.0)
     assert later.until_s == state.until_s + gap_s
     assert later.known.mean == pytest.approx(keep * state.known.mean)

@@ -137,7 +137,7 @@ def watch(
         duration_s = float(grams.duration_s[index])
         if begin_s - state.until_s >= rules.port_s:
             state = called(state, calibration, begin_s)
-        state = _waited(state, calibration, begin_s + duration_s, float(stretches.heading[index]))
+        state = _waited(state, calibration, begin_s, begin_s + duration_s, float(stretches.heading[index]))
         if (shoal := float(grams.shoal[index])) > calibration.shoal_limit:
             shoalest, shoal_s = max(state.shoalest, shoal), state.shoal_s + duration_s
             state = replace(state, left_out_s=state.left_out_s + duration_s, shoal_s=shoal_s, shoalest=shoalest)
@@ -302,8 +302,11 @@ def _less(products: Array, change: Array) -> Array:
     return np.asarray(after.T @ products @ after)
 
 
-def _waited(state: State, calibration: Calibration, until_s: float, heading: float) -> State:
-    """The state at the beginning of the stretch that ends then, with the force's memory faded over the gap."""
+def _waited(state: State, calibration: Calibration, begin_s: float, until_s: float, heading: float) -> State:
+    """The state at the beginning of a stretch, with the force's memory faded over the gap before it.
+
+    Sums that hold nothing yet begin after the gap, where there are data.
+    """
     nuisance, gap = calibration.nuisance, (until_s - state.until_s, heading - state.heading)
     keep = nuisance.memory(*gap)
     return replace(
@@ -312,7 +315,7 @@ def _waited(state: State, calibration: Calibration, until_s: float, heading: flo
         heading=heading,
         known=after_gap(state.known, nuisance, *gap),
         rough=after_gap(state.rough, calibration.others, *gap),
-        sums=state.sums.later(keep),
+        sums=state.sums.later(keep).begun_by(begin_s),
         whole=state.whole.later(keep),
         pending=None if state.pending is None else state.pending.later(keep),
     )

@@ -125,6 +125,11 @@ class Sums:
         """The sums after a gap over which the force's autocorrelation is (f,)."""
         return replace(self, taken=keep[:, None] * self.taken)
 
+    def begun_by(self, time_s: float) -> Sums:
+        """The sums, those that hold nothing yet from a time on [s]."""
+        empty = ~self.information.any(axis=(1, 2))
+        return replace(self, since_s=np.where(empty, time_s, self.since_s))
+
     def unjudged(self, one: Judged) -> Sums:
         """The sums after a stretch that the force is learnt from alone."""
         return replace(self, taken=beside(one, self.taken)[2])
