@@ -29,7 +29,6 @@ import numpy as np
 from expdesign.conventions import OUTPUTS, plus_minus
 from expdesign.errors import InputError
 from expdesign.estimation.regression import inputs_of, model_for
-from expdesign.kinematics.axes import axes_of_positions
 from expdesign.kinematics.held import Held, held, knots_held
 from expdesign.kinematics.instruments import (
     Finding,
@@ -53,6 +52,8 @@ OPPOSED = (0.1, 10.0)  # least and most size of an answer to an input, in units 
 OPPOSED_SHARE = 0.3  # share of the changes that the input explains then
 ALIKE = 3.0  # factor from one within which an answer is that of the model
 TURNED_RAD, TURNED_SHARE = 1.6, 0.95  # turn against a held input, and its share of all turns, that count as opposed
+AXES_MATTER = 0.3  # difference of the scales of both axes that is told; slow sway may look like half of it
+EXPLAINED = 0.5  # least share of the way along one axis that the other then explains
 PUSHING = 0.1  # share of an input's largest effect below which it is not held to any side
 
 GROUPS = (
@@ -366,6 +367,39 @@ def _disagreements(batches: Sequence[Batch], vessel: Vessel, model: VesselModel)
         turned = [_heading_sooner(batch, late_s) for batch in batches] if late_s else batches
         yield from log_against_positions(turned, length_m=length_m)
     yield from against_inputs(batches, model, length_m=length_m)
+
+
+def axes_of_positions(batches: Sequence[Batch], *, length_m: float) -> Iterator[Finding]:
+    """The scale of east over that of north, a, where it certainly is not one: an axis in feet, or unshortened degrees.
+
+    A ship moves along her heading, whatever her course, so that on tracks that bend enough to tell
+
+        east' cos(heading) = a north' sin(heading) + sway + stream + bias ahead'
+    """
+    own = [batch for batch in batches if batch.pose is not None]
+    found = relation(stretches(own, [_ways(batch) for batch in own], length_m=length_m))
+    if found is None or found.ratio.real <= 0.0 or found.share < EXPLAINED:
+        return
+    if found.differs(1.0, by=AXES_MATTER):
+        ratio, std = found.size, found.size_std
+        yield Finding(
+            name="position_axes", value=ratio, std=std, rest=found.rest,
+            text=f"positions move {plus_minus(ratio, std)} times as far to east as to north for the same way along the "
+            "heading: has one axis another unit (feet are 0.3048 m), or are degrees of longitude not shortened by the "
+            "cosine of the latitude? Nothing that follows from these positions is right.",
+        )  # fmt: skip
+
+
+def _ways(batch: Batch) -> Array:
+    """(k, 6) running way to east by cosine and to north by sine of the heading, heading, way ahead, stream to both."""
+    assert batch.pose is not None
+    north, east, heading = batch.pose.T
+    middle = (heading[1:] + heading[:-1]) / 2.0
+    along = np.diff(east) * np.cos(middle), np.diff(north) * np.sin(middle)
+    ahead = np.diff(north) * np.cos(middle) + np.diff(east) * np.sin(middle)
+    stream = np.cos(middle) * batch.sample_time_s, np.sin(middle) * batch.sample_time_s
+    own, other, *rest = (np.cumsum(np.append(0.0, part)) for part in (*along, ahead, *stream))
+    return np.column_stack([own, other, heading, *rest])
 
 
 def _heading_sooner(batch: Batch, late_s: float) -> Batch:
