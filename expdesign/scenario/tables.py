@@ -211,13 +211,12 @@ def _dotted(place: Iterable[str | int]) -> str:
     for step in place:
         if step in UNION_PARTS:
             continue
-        part = f"[{step + 1}]" if isinstance(step, int) else _key_text(step)
-        text += part if isinstance(step, int) or not text else f".{part}"
+        if isinstance(step, int):
+            text += f"[{step + 1}]"
+        else:
+            plain = re.fullmatch(r"[\w-]+", step)
+            text += f"{'.' if text else ''}{step if plain else repr(step[:60])}"
     return text
-
-
-def _key_text(key: str) -> str:
-    return key if re.fullmatch(r"[\w-]+", key) else repr(key[:60])
 
 
 def _model_at(model: type[Table], place: Iterable[str | int]) -> type[Table] | None:

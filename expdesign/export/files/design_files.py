@@ -127,7 +127,10 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
             "outcomes": list(problem.aim.outcomes),
             "prior_information": bool(problem.prior.any()),
             "limits": [vars(kept) for kept in limits_kept(design)],
-            "efficiencies": {item.criterion: _efficiency_entry(item) for item in compared},
+            "efficiencies": {
+                item.criterion: {"title": item.title, "designs": dict(item.of), "missing": item.missing or None}
+                for item in compared
+            },
         }
     )
 
@@ -148,10 +151,6 @@ def _solver_entry(design: DurationDesign) -> dict[str, Any] | None:
     """What found the fractions, before they were rounded to whole runs."""
     found = design.solver
     return None if found is None else {**asdict(found), "wall_s": round(found.wall_s, 3)}
-
-
-def _efficiency_entry(item: Efficiencies) -> dict[str, Any]:
-    return {"title": item.title, "designs": dict(item.of), "missing": item.missing or None}
 
 
 def dictionary_files(

@@ -263,10 +263,10 @@ Link = tuple[str, str, str]
 
 def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
     """The links that lead from durations to the route, each with its proof."""
-    design, plan, check = content.design, content.plan, content.plan.verification
+    design, plan, check, day = content.design, content.plan, content.plan.verification, content.day
     links = [
         (
-            f"Optimal durations{', which state the accuracy' if _asks_accuracy(content.day) else ''}",
+            f"Optimal durations{', which state the accuracy' if day is not None and day.most_s is None else ''}",
             f"no other allocation of the time is better by more than {short_of_optimum}",
             "equivalence theorem, with the matrices in dictionary.json",
         ),
@@ -275,7 +275,7 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
             f"{words.percent(design.efficiency_repeats)} of that optimum",
             "information of the whole runs",
         ),
-        *_day_links(content.day),
+        *_day_links(day),
     ]
     for step, share, proof in (
         (
@@ -293,10 +293,6 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
         "independent simulation with a ten times smaller step; swept hull against the polygons of the chart",
     )
     return [*links, water, *_route_links(content)]
-
-
-def _asks_accuracy(day: ShortestDay | None) -> bool:
-    return day is not None and day.most_s is None
 
 
 def _day_links(day: ShortestDay | None) -> list[Link]:

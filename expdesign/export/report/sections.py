@@ -317,7 +317,7 @@ def _manoeuvres(content: ReportContent) -> Section:
         settings = tables.settings_sentence(item)
         figures.append(
             Figure(
-                draw=draw if repeats or not content.plan.draft else _not_drawn,
+                draw=draw if repeats or not content.plan.draft else partial(str, NOT_DRAWN),
                 caption=Markup("<b>{}</b> \N{MIDDLE DOT} {}, {} \N{MIDDLE DOT} {}{}").format(
                     content.shown(one.name),
                     words.family(one.family),
@@ -334,10 +334,6 @@ def _manoeuvres(content: ReportContent) -> Section:
         "desired one.",
         Gallery(tuple(figures)),
     )
-
-
-def _not_drawn() -> str:
-    return NOT_DRAWN
 
 
 def _admissible(content: ReportContent) -> Section:
