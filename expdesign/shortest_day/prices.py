@@ -22,7 +22,9 @@ from expdesign.plan.values import PlanProblem
 from expdesign.signals import Trajectory
 from expdesign.values import Array, sealed
 
-FIRST_SHARE = 0.55  # information from runs in the first day, as a share of what is needed; legs tell the rest
+# information from runs in the first day, as a share of what is needed, as legs tell the rest; and in a draft, whose
+# manoeuvres tell less, so that it has more runs and more legs
+FIRST_SHARE, DRAFT_SHARE = 0.55, 0.42
 COURSES = 4  # on which runs are taken to be sailed
 # standard deviation of these about the straight line, before a day has been planned: two courses, so far to each side,
 # average smooth functions as any even spread does, up to the third order
@@ -163,7 +165,7 @@ def first_prices(problem: PlanProblem) -> Prices:
         runs=runs,
         leg=np.zeros_like(runs[0]),
         goal=np.zeros_like(runs[0]),
-        level=float(np.log(FIRST_SHARE)),
+        level=float(np.log(DRAFT_SHARE if problem.settings.draft else FIRST_SHARE)),
     )
 
 

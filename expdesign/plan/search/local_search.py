@@ -59,8 +59,10 @@ def runs_clear(space: SearchSpace, primitive: np.ndarray, start: Array) -> np.nd
 
 def have_room(space: RunSpace | SearchSpace, primitive: np.ndarray, start: Array) -> np.ndarray:
     """(n,) whether runs (n,) from poses (n, 3) and their ends keep their margins on the grid."""
-    ends_clear = _ends_clear(space, start, run_ends(space, primitive, start))
-    return np.asarray(ends_clear & _hulls_clear(space, primitive, start))
+    clear = _ends_clear(space, start, run_ends(space, primitive, start))
+    left = np.flatnonzero(clear)
+    clear[left] = _hulls_clear(space, primitive[left], start[left])
+    return clear
 
 
 def _ends_clear(space: RunSpace | SearchSpace, start: Array, end: Array) -> np.ndarray:
