@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from expdesign.plan.assembly import PlanRoom, roomy_water
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.legs_ahead import KnownLegs
-from expdesign.plan.local_planner import Departure
+from expdesign.plan.local_planner import Departure, SearchSpace
 from expdesign.plan.sailing import know_legs, sail_all, sail_placed
 from expdesign.plan.search import measured_s, with_another
 from expdesign.plan.values import Placement, PlanProblem, SailedTrial, WorkBudget
@@ -106,17 +107,23 @@ def another_in_leg(problem: PlanProblem, draft: Draft, leg: int, run: int) -> tu
         leg: number of the leg between two runs; that of the last leads to the goal.
         run: index of the run's footprint in the draft's room.
     """
-    space, placed, begin = draft.room.space, draft.sailed.placements, problem.begin
-    names = [item.name for item in space.footprints]
-    runs, poses = [names.index(item.primitive) for item in placed], np.array([item.pose for item in placed])
-    departure = Departure(pose=begin[:3], exit_mps=float(begin[3]), last=-1)
-    grown = with_another(space, departure, runs, poses.reshape(-1, 3), leg=leg, run=run)
+    space, footprint = draft.room.space, draft.room.space.footprints[run]
+    begun, runs, poses, departure, before_s = _by_rule(problem, draft)
+    grown = with_another(space, departure, runs, poses, leg=leg, run=run)
     if grown is None:
         return None
-    begun = replace(space, go_around=None)  # each run begins at the first attempt
-    more = [*runs[:leg], run, *runs[leg:]]
-    legs_s = measured_s(begun, more, grown, departure) - measured_s(begun, runs, poses.reshape(-1, 3), departure)
-    return Placement(primitive=names[run], pose=grown[leg]), legs_s + space.footprints[run].duration_s
+    legs_s = measured_s(begun, [*runs[:leg], run, *runs[leg:]], grown, departure) - before_s
+    return Placement(primitive=footprint.name, pose=grown[leg]), legs_s + footprint.duration_s
+
+
+@lru_cache(maxsize=1)
+def _by_rule(problem: PlanProblem, draft: Draft) -> tuple[SearchSpace, list[int], Array, Departure, float]:
+    """A draft as it was placed: its space without go-arounds, its runs, their poses, its start, and its legs' time."""
+    names, placed, begin = [item.name for item in draft.room.space.footprints], draft.sailed.placements, problem.begin
+    runs, poses = [names.index(item.primitive) for item in placed], np.array([item.pose for item in placed])
+    begun = replace(draft.room.space, go_around=None)  # each run begins at the first attempt
+    chain = runs, poses.reshape(-1, 3), Departure(pose=begin[:3], exit_mps=float(begin[3]), last=-1)
+    return begun, *chain, measured_s(begun, *chain)
 
 
 def _measured(

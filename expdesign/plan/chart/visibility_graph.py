@@ -102,9 +102,8 @@ class Roadmap:
 
     def sees(self, point: Array, nodes: Array) -> np.ndarray:
         """Indices of the nodes in sight of a point."""
-        lines = sight_lines(np.broadcast_to(point, nodes.shape), nodes)
         apart = np.hypot(*(nodes - point).T) > 0
-        return np.flatnonzero(shapely.covers(self.water, lines) | ~apart)
+        return np.flatnonzero(_joined(self.water, np.broadcast_to(point, nodes.shape), nodes) | ~apart)
 
     def joins(self, a: Array, b: Array) -> np.ndarray:
         """(n,) whether points (n, 2) are in sight of each other."""
