@@ -1,5 +1,6 @@
 """Simulations of the diagnosis, their derivatives, and the vessel files that are written from them."""
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -165,10 +166,11 @@ def test_each_rudder_and_each_of_several_engines_may_have_a_scale(path):
     assert {names[column] for key in keys for column in group_columns(key[6:], names)} == wanted
     start = initial_states(windows)
     before = simulate_windows(plain, windows, start).predicted
-    for key in keys:
-        extended = plain.with_effects({key: -0.3})
+    for key, scale in itertools.product(keys, (-0.3, -1.0)):
+        extended = plain.with_effects({key: scale})
         one = simulate_windows(extended, windows, start).predicted
-        again, _ = extend(vessel, extended, {})
+        again, _ = extend(vessel, extended, {key: 0.1})
+        assert np.isfinite(again.model.parameter_std).all()
         other = simulate_windows(extended_model(again, record), windows, start).predicted
         assert np.abs(one - other).max() < 1e-9
         assert np.abs(one - before).max() > 1e-6

@@ -377,7 +377,7 @@ OTHERS = (
     ),
     _share(
         ACTUATORS, "scale", "share by which rudder angles or one engine's speed exceed orders, offset included",
-        "input_factor_{}", -0.8, 1.5, 0.1,
+        "input_factor_{}", -1.05, 1.5, 0.1,  # an engine or a rudder that does nothing, and the error of that
     ),
     Quantity(
         stage=WEATHER, effects=("current",), words="steady current to north or east", result="{}_mps", unit="m/s",

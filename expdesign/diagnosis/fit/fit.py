@@ -26,7 +26,7 @@ from expdesign.values import Array
 from expdesign.vessel.quantities import TIME, acts_on, effect_row
 
 STEPS = 8  # Gauss-Newton steps of a fit, at most
-SMALLEST_FACTOR_CHANGE = -0.8  # factors of inertia, thrust, log and gyro stay above one plus this
+SMALLEST_FACTOR_CHANGE = -0.8  # factors stay above one plus this on the way, or above their least possible ones
 LARGEST_RATIO = 3.0  # times and widths change by this factor in a step, at most
 BEYOND_STD_LEVEL = 1e-3  # of the test whether parameters are within their stated standard deviations
 LEAST_CORRELATION_EIGENVALUE = 1e-6  # of stated parameters; smaller ones count as rounded
@@ -235,7 +235,7 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
             least = 0.0 if kind in FOLLOWING else before / ratio
             value = min(max(value, least, LEAST_EFFECT), max(before, 1e-3) * ratio)
         elif effect_row(key).neutral == 1.0 and not acts_on(key, TIME):
-            value = max(value, SMALLEST_FACTOR_CHANGE)
+            value = max(value, min(SMALLEST_FACTOR_CHANGE, effect_row(key).low))
         result[key] = value
     return result
 

@@ -108,6 +108,7 @@ def _taken_apart(expression: str) -> tuple[str, Polynomial]:
 
 TURN = re.compile(r"\btau_psi\b")
 FORCES = {"u": "X", "v": "Y", "r": "N"}
+TINY = 1e-300
 VISIBLE = 1e-4  # relative error of a written dependence on depth above which a note states it
 
 
@@ -177,7 +178,8 @@ def _scaled(row: Row, ship: ExtendedModel, std: Mapping[str, float]) -> Row:
         changed = re.sub(rf"\b({'|'.join(names)})\b", rf"({1.0 + value:.9g}*\1)", text)
         for force, own in _own_force(ship, names).items():
             changed = re.sub(rf"\b{force}\b", f"({force} + {value:.9g}*({own}))", changed)
-        relative += 0.0 if changed == text else std.get(key, 0.0) / (1.0 + value)
+        error = std.get(key, 0.0)
+        relative += 0.0 if changed == text else error / max(abs(1.0 + value), error, TINY)
         text = changed
     if text == row.term.expression:
         return row
