@@ -138,6 +138,22 @@ def test_what_a_cell_may_save_beyond_its_middle_is_its_spread_at_the_slowest_spe
     assert saving._slowness >= slowest - 1e-12
 
 
+def test_what_a_cell_near_the_shore_saves_is_unknown_until_cells_are_small() -> None:
+    """An end in the middle of a large cell may be ashore, or have no straight way, where others in the cell do not."""
+    water, track = shapely.box(-100, -100, 100, 100), track_of(half_turn(), ship(), np.zeros(2))
+    times = goal_times(build_visibility_graph(water), np.zeros(2), STILL)
+    saving = Saving(track=track, times=times, water=water, cell_m=5.0)
+    farthest_m = max(end[0, 0] for end in track.ends(np.zeros((1, 3))))
+    beyond_m = np.array([-1.5, -0.5, 0.5]) * saving._spread_m(track.ends_m, 0)
+    cells = np.column_stack([100.0 - farthest_m + beyond_m, np.zeros((3, 2))])
+    inside, near, ashore = saving._saved(cells, 0)[0].tolist()
+    assert np.isfinite(inside)
+    assert near == ashore == np.inf
+    small = saving._saved(cells, LEVELS)[0]
+    assert np.isfinite(small[:2]).all()
+    assert small[2] == -np.inf
+
+
 def test_in_open_water_a_run_saves_what_its_chord_takes():
     run = half_turn()
     whole_s, saved = saved_by([run], shapely.box(-300, -300, 300, 300), (np.array([-250.0, 0]), np.array([250.0, 0])))
