@@ -10,7 +10,9 @@ import pytest
 from expdesign import workflows
 from expdesign.importing import COMPUTER, GNSS, NONE, OWN, Channel, Log, joined
 from expdesign.importing.channels import RESTART_GAP_S
+from imported_runs import run_import
 from instrumented_ship import NAMES, POSE, voyages, write_log
+from logged_trial import voyage, write_own
 
 
 def log(source: str, begin_s: float, clock: str, names: str = "abcde", unit: str = "") -> Log:
@@ -24,7 +26,7 @@ def log(source: str, begin_s: float, clock: str, names: str = "abcde", unit: str
 def test_files_are_put_in_the_order_of_their_times(clock: str) -> None:
     (whole,) = joined([log("file 3", 7200.0, clock), log("file 1", 0.0, clock), log("file 2", 60.0, clock)])
     assert whole.source == "file 1"
-    assert len(whole.notes) == 2
+    assert len(whole.notes) == 1
     for channel in whole.channels:
         assert channel.time_s[::60].tolist() == [0.0, 60.0, 7200.0]
         assert channel.values[::60].tolist() == [1.0, 2.0, 3.0]
@@ -130,3 +132,15 @@ def test_a_log_of_which_nothing_is_used_is_told(tmp_path: Path) -> None:
     said = " ".join((tmp_path / "out" / "import.json").read_text(encoding="utf-8").split())
     assert "other.csv: nothing of it is used" in said
     assert any("other.csv: nothing of it is used" in note for note in outcome.document.notes)
+
+
+def test_what_is_true_of_many_files_is_said_once(tmp_path: Path) -> None:
+    trip = voyage(parts=(("zigzag", 40.0),)).every(10)
+    paths = [write_own(tmp_path / f"{name}.csv", trip) for name in "abcd"]
+    _, said, _ = run_import(*paths)
+    notes = said["notes"]
+    assert len(set(notes)) == len(notes)
+    (joined,) = [note for note in notes if "is read as what comes next" in note]
+    assert joined.startswith("a.csv: b.csv and 2 more: ")
+    assert sum("time is time_s" in note for note in notes) == 1
+    assert not any("too long to be filled" in note for note in notes)  # the gaps between them are ours

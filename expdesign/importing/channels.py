@@ -6,7 +6,7 @@ Times count from 1970 UTC where the clock is that of a satellite receiver or a c
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -363,9 +363,20 @@ def _as_one(group: Sequence[Log]) -> Log:
     return replace(
         first,
         channels=tuple(_in_a_row(own, first.source) for own in parts.values()),
-        notes=(*first.notes, *(f"{log.source}: {note}" for log in others for note in log.notes)),
+        notes=(*first.notes, *_shared_notes(others, first.notes)),
         unused=tuple(dict.fromkeys(text for log in group for text in log.unused)),
     )
+
+
+def _shared_notes(logs: Sequence[Log], said: Sequence[str]) -> Iterator[str]:
+    """Notes of logs that are not said yet, each once, behind the names of the logs that have it."""
+    names: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.notes:
+            if note not in said:
+                names.setdefault(note, []).append(log.source)
+    for note, (name, *more) in names.items():
+        yield f"{name}{f' and {len(more)} more' if more else ''}: {note}"
 
 
 def _in_a_row(parts: Sequence[Channel], source: str) -> Channel:

@@ -17,7 +17,7 @@ import numpy as np
 
 from expdesign.conventions import listed, rotated
 from expdesign.errors import NoAnswer
-from expdesign.importing.channels import Channel
+from expdesign.importing.channels import RESTART_GAP_S, Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, Mapping
 from expdesign.kinematics import held
 from expdesign.records.file import PLANNED, REACHED, STEERED, input_name, is_input
@@ -321,7 +321,10 @@ def _left_out(main: Table[str, Channel], step_s: float) -> list[str]:
             groups.setdefault((len(long), float(long.min()), float(long.max())), []).append(name)
     notes = []
     for (count, shortest, longest), names in groups.items():
-        who = "all main columns" if len(names) == len(main) > 1 else listed(names)
+        shared = len(names) == len(main) > 1
+        if shared and abs(shortest - RESTART_GAP_S) + abs(longest - RESTART_GAP_S) < 1e-3:
+            continue  # put between files, or where a clock began anew, which is told there
+        who = "all main columns" if shared else listed(names)
         size = f"{shortest:.3g} to {longest:.3g} s" if longest > 1.01 * shortest else f"{longest:.3g} s"
         gap = f"{count} gaps of {size}" if count > 1 else f"a gap of {size}"
         verb = "has" if len(names) == 1 else "have"
