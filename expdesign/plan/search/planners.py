@@ -8,12 +8,13 @@ import numpy as np
 
 from expdesign.errors import NoPlan, NoRoom
 from expdesign.plan.local_planner import Departure, SearchSpace
-from expdesign.plan.search.beam import place_runs
+from expdesign.plan.search.beam import POLISHED_ORDERS, place_runs
 from expdesign.plan.search.lattice import search_lattice
 from expdesign.plan.search.lattice_moves import Lattice, build_lattice
 from expdesign.plan.values import LatticeProof, Placement, Placements, PlanSettings, WorkBudget
 from expdesign.progress import Progress, silent
 
+DRAFT_ORDERS = 2  # orders of runs of which the best plan is polished in a draft
 LATTICE_RADII = 1.1  # default distance between cells of the lattice, in turning radii
 LATTICE_POSES = 60_000  # poses that the default keeps below where the water is large
 LATTICE_FINER = (1.0, 0.7, 0.5)  # factors on the default distance that are tried where the lattice holds no plan
@@ -36,8 +37,8 @@ def placed_runs(
         NoPlan: some run does not fit anywhere the search can reach, or no path leads to the goal.
     """
     if settings.planner == "beam":
-        budget = WorkBudget()
-        runs = place_runs(space, repeats, departure, budget=budget, progress=progress)
+        budget, orders = WorkBudget(), DRAFT_ORDERS if settings.draft else POLISHED_ORDERS
+        runs = place_runs(space, repeats, departure, orders=orders, budget=budget, progress=progress)
         return Placements(runs=runs, work_s=budget.spent_s)
     return placed_on_lattice(space, repeats, departure, spacing_m=settings.lattice_spacing_m, progress=progress)
 
