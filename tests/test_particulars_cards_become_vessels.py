@@ -12,6 +12,7 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.export.files import vessel_toml
+from expdesign.export.nominal_page import BY_PROPELLERS, nominal_notes
 from expdesign.indices import standard_results
 from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, assumed, nominal
 from expdesign.particulars.fit import Problem, fitted
@@ -20,6 +21,7 @@ from expdesign.particulars.model import SAMPLES, STEERING, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_card, load_vessel
 from expdesign.scenario.card_file import RudderTable, ThrusterTable
+from expdesign.simulation import Helm
 from scenario_files import SCENARIOS
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -269,6 +271,17 @@ def test_a_catamaran_is_as_wide_as_both_hulls(tmp_path: Path) -> None:
     out.write_text(vessel_toml(problem.ship))
     assert problem.card.hull.beam_m == 0.25
     assert load_vessel(out).beam_m == 1.08
+
+
+@pytest.mark.thorough
+def test_what_a_helm_is_of_a_craft_without_one_is_said() -> None:
+    """A circle's helm in the table is 35 degrees; her orders then differ by what the note says."""
+    craft, coaster = (nominal(load_card(path)) for path in (SHIPS / "otter.toml", CARDS / "coaster-80m.toml"))
+    orders = Helm(vessel=craft.vessel).inputs(0.2, math.radians(35.0))
+    shares = [n / (limit.high if n > 0 else -limit.low) for n, limit in zip(orders, craft.vessel.limits, strict=True)]
+    assert sorted(shares) == pytest.approx([0.2 - 0.57, 0.2 + 0.57], abs=0.005)
+    assert BY_PROPELLERS in nominal_notes(craft)
+    assert BY_PROPELLERS not in nominal_notes(coaster)
 
 
 @pytest.mark.parametrize("name", WRONG)

@@ -9,6 +9,7 @@ from expdesign.export.document import Document, Table, notes_of, section
 from expdesign.export.files import finite, strict_json, vessel_toml
 from expdesign.export.words import ship
 from expdesign.particulars import Assumed, Nominal, Predicted, Trial, assumed, is_usual, shown
+from expdesign.simulation import Helm
 
 TRIAL_HEADER = ("Trial", "Result", "Predicted", "95 % from", "To", "Stated", "From particulars alone")
 FACTOR_HEADER = ("Part of the forces", "Source", "Scatter before", "Times", "Scatter after")
@@ -50,6 +51,10 @@ UNUSUAL = (
 )
 PLANING = "wave-making and planing are not in the regressions, state speeds at several orders."
 HUMP = 0.45
+BY_PROPELLERS = (
+    "She steers by her propellers: a helm of 35 deg stands for an order of 57 % of full more on one side and less on "
+    "the other, whatever her speed, so that she may gather speed in a circle that begins slowly."
+)
 ASSUMED = (
     "The card does not state these, so that they are the program's, not the ship's. State what is known: plans ask of "
     "her what limits and rates allow."
@@ -69,7 +74,9 @@ def nominal_notes(found: Nominal) -> tuple[str, ...]:
     forms = () if is_usual(found.card.hull) else (UNUSUAL,)
     planes = (f"At full order her Froude number is {froude:.2f}: {PLANING}",) if froude > HUMP else ()
     windless = () if found.card.windage else (calm,)
-    return (*found.contradictions, *(() if measured else (NO_TRIAL,)), *forms, *planes, SIDES, SPEEDS, *windless)
+    helmless = (BY_PROPELLERS,) if Helm(vessel=found.vessel).means == "propeller" else ()
+    untried = () if measured else (NO_TRIAL,)
+    return (*found.contradictions, *untried, *forms, *planes, *helmless, SIDES, SPEEDS, *windless)
 
 
 def trial_words(trial: Trial) -> str:
