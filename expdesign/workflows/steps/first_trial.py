@@ -2,8 +2,9 @@
 
 Where the standard deviations of the parameters are wide, runs as long as a dictionary asks for lead the ships of the
 prior too far apart to be safe, or to come to the next run. The first trial then takes each run only as long as these
-ships keep to its planned track, at a speed that they reach, and its legs turn as wide as they do. Its runs begin, and
-its goal is reached, less exactly than usual. What it tells narrows the prior, and `replan` goes on with longer runs.
+ships keep to its planned track, at a speed that they reach, and its legs are as slow and turn as wide as they need. Its
+runs begin, and its goal is reached, less exactly than usual. What it tells narrows the prior, and `replan` goes on with
+longer runs.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from expdesign.plan.solve import draft_trial, plan_drafted
 from expdesign.plan.values import Plan, PlanProblem, PlanSettings
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario
-from expdesign.simulation import simulate_many
+from expdesign.simulation.helm import Approach
+from expdesign.values import Array
 from expdesign.vessel import VesselModel
 from expdesign.vessel.vessel import covering_discs
 
@@ -35,6 +37,10 @@ CUT = (0.5, 0.9)  # least and most share of a run that is tried next
 SHORTEST = 0.15  # share of a run below which it is left out
 SPEEDS = 200  # between rest and top speed, at which the thrust of drawn ships is compared with their resistance
 WIDEST = 8.0  # hull lengths of the turning radius of legs at most
+SLOWER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.33)  # shares of the speed of legs that are tried where ships turn wider
+NEARLY = 0.9  # share of a turning radius by which a tighter one is not worth slower legs
+STEPS = 20  # in the time of a hull length, of turns of drawn ships
+ENGINE_GAIN = 3.0  # engine order, of full ahead, by the share of the speed that is missing in such turns
 START_TOLERANCE = 3.0  # so many times less exactly than usual its runs begin, and its goal is reached
 TIME_SHARE = 0.4  # of the scenario's informative time that a first trial takes
 
@@ -97,7 +103,8 @@ def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     """Settings with a speed and a turning radius of legs that most ships of the prior reach.
 
     The speed is that of full ahead on a straight course, or of the fastest run; the radius that of the helm as far over
-    as legs use it. Where the file states a slower speed or a wider radius, that stays.
+    as legs use it. Where that radius is too wide, legs are as much slower as makes it tighter: thrust turns a slow ship
+    on a tighter circle, a rudder hardly does. Where the file states a slower speed or a wider radius, that stays.
     """
     vessel, plan = case.vessel, case.plan
     fastest_run = max((speed for spec in case.dictionary for speed in _speeds(spec).values()), default=np.inf)
@@ -109,27 +116,37 @@ def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     ahead = approach.helm.inputs(1.0, approach.angle_rad)
     surge, _, _ = vessel.model.accelerations((speeds, 0.0, 0.0), (speeds, 0.0), ahead, parameters=drawn.T)
     fastest = float(np.quantile(speeds[np.maximum((surge > 0.0).sum(axis=0) - 1, 0), 0], 1.0 - ABLE))
-    over = approach.starboard * HELM_SHARE * (approach.helm.hardest(approach.drive) - abs(approach.angle_rad))
-    helms = approach.angle_rad + np.repeat([over, -over], DRAWN)
-    samples = int(np.ceil(STEADY_HULLS * vessel.length_m / ship.transit_speed_mps / vessel.sample_time_s))
-    orders = approach.helm.rows(np.array(approach.drive), helms)  # (2 DRAWN, m)
-    states = simulate_many(
-        vessel,
-        np.repeat(orders[:, None], samples, axis=1),
-        pose=np.zeros((len(orders), 3)),
-        velocity=np.tile(approach.velocity, (len(orders), 1)),
-        current_to=np.zeros((len(orders), 2)),
-        wind_to=np.zeros((len(orders), 2)),
-        parameters=np.tile(drawn, (2, 1)),
-    )
-    u, v, r = np.nan_to_num(states[-1, :, 3:].T, nan=0.0, posinf=0.0, neginf=0.0)
-    radii = np.where(r == 0.0, np.inf, np.hypot(u, v) / np.maximum(np.abs(r), 1e-12)).reshape(2, DRAWN)
-    widest = min(float(np.quantile(radii.max(axis=0), ABLE)), WIDEST * vessel.length_m)
-    return replace(
-        plan,
-        transit_speed_mps=min(ship.transit_speed_mps, USABLE_SHARE * fastest, fastest_run),
-        turning_radius_m=max(ship.turning_radius_m, widest),
-    )
+    usual, widest_m = min(ship.transit_speed_mps, USABLE_SHARE * fastest, fastest_run), WIDEST * vessel.length_m
+    radii_m = {
+        share * usual: float(np.quantile(_turning_radii_m(approach, share * usual, drawn), ABLE)) for share in SLOWER
+    }
+    tight_m = max(widest_m, min(radii_m.values()) / NEARLY)
+    speed, radius_m = next((speed, radius_m) for speed, radius_m in radii_m.items() if radius_m <= tight_m)
+    return replace(plan, transit_speed_mps=speed, turning_radius_m=max(ship.turning_radius_m, min(radius_m, widest_m)))
+
+
+def _turning_radii_m(approach: Approach, speed_mps: float, drawn: Array) -> Array:
+    """(n,) radii of turns to the worse side at a surge speed that the engines hold, with the helm that legs use [m].
+
+    Args:
+        approach: of the nominal ship, at any speed.
+        speed_mps: see above.
+        drawn: (n, p) parameters of the ships.
+    """
+    helm, model = approach.helm, approach.helm.vessel.model
+    over = HELM_SHARE * (helm.hardest(approach.drive) - abs(approach.angle_rad))
+    angles = approach.angle_rad + np.repeat([over, -over], len(drawn))
+    parameters, step_s = np.tile(drawn, (2, 1)).T, helm.vessel.length_m / speed_mps / STEPS
+    motion = np.zeros((3, len(angles)))
+    motion[0], order = speed_mps, approach.drive * speed_mps / approach.speed_mps
+    with np.errstate(all="ignore"):  # some ships of a wide prior are beyond all bounds
+        for _ in range(int(STEADY_HULLS * STEPS)):
+            drive = np.clip(order + ENGINE_GAIN * (1.0 - motion[0] / speed_mps), 0.0, 1.0)
+            inputs = tuple(helm.rows(drive, angles).T)
+            rates = model.accelerations(tuple(motion), tuple(motion[:2]), inputs, parameters=parameters)
+            motion = motion + step_s * np.stack(np.broadcast_arrays(*rates))
+        radii = np.hypot(*motion[:2]) / np.abs(motion[2])
+    return np.asarray(np.nan_to_num(radii, nan=np.inf).reshape(2, -1).max(axis=0))
 
 
 def _length_s(case: Scenario, spec: PrimitiveSpec) -> float:
@@ -176,7 +193,7 @@ def first_note(runs: Sequence[Primitive], asked: Sequence[PrimitiveSpec]) -> str
         for run in runs
         if run.name in settings
     )
-    slower = f" ({slowed} of them slower than asked, as most of these ships reach no more)" if slowed else ""
+    slower = f" ({slowed} of them slower than asked, for what most of these ships reach, or steer at)" if slowed else ""
     return (
         "a first trial: the standard deviations of the parameters are too wide for the runs asked for, so "
         f"{len(runs)} of {len(asked)} are taken{slower}, none longer than ships of the prior keep within "
