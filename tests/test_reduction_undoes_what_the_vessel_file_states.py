@@ -12,8 +12,9 @@ from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.nuisance import unbiased_value
 from expdesign.estimation.replay import Integration
-from expdesign.reduction import at_reference_point, reduced, with_reduced_wind
+from expdesign.reduction import at_reference_point, reduced, with_delivered_inputs, with_reduced_wind
 from expdesign.reduction.sensors import readings
+from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import CALM, Environment, deliver, measure, simulate, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
@@ -21,6 +22,7 @@ from expdesign.vessel import SCALAR, Response, Sensors, Vessel, response_values,
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 from expdesign.vessel.structures import parse_expression
 from measured_trials import tug_commands
+from scenario_files import SCENARIOS
 
 WIND = Environment(wind_to=np.array([4.0, -3.0]))
 COMMANDS = tug_commands(400)
@@ -400,3 +402,23 @@ def test_intervals_cover_as_often_as_without_faults():
 @pytest.mark.slow
 def test_intervals_cover_as_often_as_without_faults_in_many_trials():
     check_coverage(150)
+
+
+@pytest.mark.parametrize("reached_in", [(), (0,), (1,), (0, 1)])
+def test_notes_on_positions_and_commands_count_every_run(reached_in: tuple[int, ...]) -> None:
+    """They went by the first run: a command in the second was called measured, or a position followed at its rate."""
+    coaster = load_vessel(SCENARIOS / "vessels/coaster-80m.toml")
+    order = np.where(np.arange(120) // 40 % 2, 0.3, -0.3)
+    inputs = np.column_stack([np.full(120, 2.0), order])
+    batches = tuple(
+        Batch(
+            name=f"run {k}", sample_time_s=1.0, input_names=("n1", "rudder1"), inputs=inputs,
+            velocity=np.ones((120, 3)), reached=("rudder1",) if k in reached_in else (),
+        )
+        for k in range(2)
+    )  # fmt: skip
+    notes = "\n".join(with_delivered_inputs(Record(batches=batches), coaster.model).notes)
+    count = len(reached_in)
+    assert ("reached_rudder1_rad is used as measured" in notes) == (count > 0)
+    assert ("reached_rudder1_rad is used as measured in 1 of 2 batches" in notes) == (count == 1)
+    assert ("rudder1_rad is taken for the command" in notes) == (count < 2)
