@@ -1,4 +1,4 @@
-"""A ship whose terms are of second order and read the turned thrust of azimuths passes the commands that take data."""
+"""Ships whose terms are of second order and read the actuators pass the commands that take data, azimuths in detail."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from expdesign.cli import main
 from expdesign.dictionary import build_primitive
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.signals import Commands
-from expdesign.simulation import positions
+from expdesign.simulation import Helm, positions, steady_ahead
 from expdesign.workflows import new
+from expdesign.workflows.commands.new import KINDS
 from measured_trials import held, write_run
 
 TRUE_SHARE = 0.06  # by which the true parameters differ from the file's, to both sides
 
 
-@pytest.fixture(scope="module")
-def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the vessel file, and runs of a ship that differs a little from it."""
-    folder = tmp_path_factory.mktemp("azimuths") / "trial"
-    case = load_scenario(new(folder, kind="azimuth").files[0])
+def sailed(folder: Path, kind: str) -> tuple[str, ...]:
+    """Names of the runs of a ship that differs a little from the vessel file, in a new folder of a kind."""
+    case = load_scenario(new(folder, kind=kind).files[0])
     model = case.vessel.model
     signs = np.where(np.arange(len(model.parameters)) % 2, 1.0, -1.0)
     true = replace(case.vessel, model=model.with_parameters(model.parameters * (1.0 + TRUE_SHARE * signs)))
@@ -34,6 +33,14 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_run(
             folder / f"{spec.name}.csv", true, run.commands, velocity=tuple(run.entry_velocity.tolist()), seed=seed
         )
+    return tuple(spec.name for spec in case.dictionary)
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the vessel file of azimuths, and runs."""
+    folder = tmp_path_factory.mktemp("azimuths") / "trial"
+    sailed(folder, "azimuth")
     return folder
 
 
@@ -48,15 +55,37 @@ def asked(folder: Path, command: str, *names: str, options: str = "") -> Path:
     return out
 
 
-RUNS = ("stop", "acceleration", "circle-helm-0.4", "circle-helm--0.4", "zigzag-20-20", "zigzag", "telegraph")
-OTHERS = tuple(name for name in RUNS if name != "zigzag-20-20")
+OTHERS = ("stop", "acceleration", "circle-helm-0.4", "circle-helm--0.4", "zigzag", "telegraph")
 
 
 @pytest.mark.thorough
-def test_estimates_find_the_ship(trial: Path) -> None:
-    found = load_vessel(asked(trial, "estimate", *RUNS, options="--method ls iv") / "vessel-estimated.toml").model
-    apart = np.abs(found.parameters - np.loadtxt(trial / "true.txt")) / found.parameter_std
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_ship_of_each_kind_is_found_indexed_diagnosed_and_watched(kind: str, tmp_path: Path) -> None:
+    """The parameters lie in their 95 % intervals, within three standard errors; of her own log she has no alarm."""
+    folder = tmp_path / "trial"
+    runs = sailed(folder, kind)
+    found = load_vessel(asked(folder, "estimate", *runs, options="--method ls iv") / "vessel-estimated.toml").model
+    apart = np.abs(found.parameters - np.loadtxt(folder / "true.txt")) / found.parameter_std
     assert np.mean(apart < 1.96) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / len(apart))
+    assert any(asked(folder, "indices", *(name for name in runs if name.startswith("circle"))).glob("*.json"))
+    assert any(asked(folder, "diagnose", *runs).glob("vessel-*.toml"))
+    watch(folder)
+    told = json.loads((folder / "monitor" / "monitor.json").read_text("utf-8"))
+    assert told["alarms"] == []
+
+
+def watch(folder: Path) -> None:
+    """Watch the ship of the vessel file by her own log; hours at samples of 1 s, shorter at shorter samples."""
+    vessel = load_vessel(folder / "vessel.toml")
+    helm, speed_mps = Helm(vessel=vessel), steady_ahead(vessel).speed_mps
+    for seed, (name, hours) in enumerate({"known": 1.5, "watched": 1.0}.items()):
+        samples, rng = int(3600 * hours), np.random.default_rng(seed)
+        engines, angle = (held(rng, samples) for _ in range(2))
+        orders = helm.rows(0.6 + 0.15 * engines, 0.3 * angle)
+        values, _ = positions(vessel.responses, orders, sample_time_s=vessel.sample_time_s, standing=None)
+        commands = Commands(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs, values=values)
+        write_run(folder / f"{name}.csv", vessel, commands, velocity=(0.6 * speed_mps, 0.0, 0.0), seed=seed)
+    asked(folder, "monitor", "watched", options=f"--reference {folder / 'known.csv'}")
 
 
 @pytest.mark.thorough
@@ -95,11 +124,6 @@ def test_a_limit_of_turns_that_a_vessel_file_states_is_kept(trial: Path) -> None
 
 def test_indices_take_them(trial: Path) -> None:
     assert any(asked(trial, "indices", "zigzag-20-20", "circle-helm-0.4").glob("*.json"))
-
-
-@pytest.mark.thorough
-def test_diagnosis_takes_them(trial: Path) -> None:
-    assert any(asked(trial, "diagnose", *RUNS).glob("vessel-*.toml"))
 
 
 @pytest.mark.thorough
