@@ -395,6 +395,8 @@ def test_another_load_is_told_as_one_cause_where_it_explains_more_than_a_change(
         assert abs(value - change[0]) < 4.0 * std
         assert "has changed, or the wind, which is not measured: another load, mass and inertia by +" in told
         assert "or, explaining the data less well, parameter p" in told
+        assert "explained as well by" not in told
+        assert "is needed to explain them" not in told
     else:
         assert alarm.loaded is None
     assert ("another load, mass" in told) == ("another load, mass" in page) == alike

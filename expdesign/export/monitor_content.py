@@ -269,8 +269,9 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     statistic, limit = told_apart(alarm.statistic, content.limit)
     whose = "a sensor" if change.effect == GYRO else "the ship"
     own, who = f"{change.words} by {size_in_words(content, alarm)}", f"{whose} has changed"
+    by_load = max(alarm.loaded[0], 0.0) if alarm.loaded else 0.0  # log-likelihood over that of the change
+    likelier = by_load > AS_LIKELY
     if load := load_in_words(content, alarm):
-        likelier = alarm.loaded is not None and alarm.loaded[0] > AS_LIKELY
         own = (
             f"{load}, or, explaining the data less well, {own}"
             if likelier
@@ -288,13 +289,14 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
         f"Since {when(alarm.since_s)} {who}: {own}. The alarm came at {when(alarm.time_s)}, with the statistic "
         f"{statistic} above the threshold {limit}."
     )
-    if alarm.as_likely:
+    if alarm.as_likely and not likelier:
         others = few([content.changes[number].words for number in alarm.as_likely])
         text += f" The data are explained as well by: {others}."
-    if alarm.unexplained > content.limit:
+    if alarm.unexplained - by_load > content.limit:
+        more, causes = ("another load", "") if likelier else ("this one change", "another load, ")
         text += (
-            " More than this one change is needed to explain them: one cause may change several parameters at once, as "
-            "another load, shallow water and weather beyond the reference do."
+            f" More than {more} is needed to explain them: one cause may change several parameters at once, as "
+            f"{causes}shallow water and weather beyond the reference do."
         )
     if not alarm.settled:
         text += " The size is not yet settled."

@@ -186,9 +186,7 @@ def _simulated(state: State, calibration: Calibration, again: Again | None, rule
     loaded = _loaded(
         _sized(state, calibration, again, rules, calibration.heavier, since), state, calibration, likely[best]
     )
-    unexplained = alarm.unexplained - max(loaded[0] if loaded else 0.0, 0.0)
-    alarm = replace(alarm, as_likely=others, pushes=pushes, loaded=loaded, unexplained=max(unexplained, 0.0))
-    return replace(state, alarm=alarm)
+    return replace(state, alarm=replace(alarm, as_likely=others, pushes=pushes, loaded=loaded))
 
 
 def _sized(
