@@ -13,7 +13,7 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.dictionary import build_primitive
-from expdesign.errors import NoPlan
+from expdesign.errors import NoAnswer, NoPlan
 from expdesign.indices import Stop, measured_trial
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.simulation import Environment, simulate
@@ -197,6 +197,21 @@ def test_most_ships_of_a_wide_prior_reach_the_speed_and_the_turn_of_a_first_tria
     full = [max(limit.high for limit in case.vessel.limits[:1]), 0.0]
     surge = wide.accelerations((u, 0.0, 0.0), (u, 0.0), full, parameters=drawn.T)[0]
     assert np.mean(surge > 0.0) > ABLE - 4 * np.sqrt(ABLE * (1 - ABLE) / DRAWN)  # of the speed's own draws
+
+
+def test_legs_of_a_prior_that_is_far_too_wide_are_finite_or_refused(tmp_path: Path) -> None:
+    """Some ships of it never turn, and of others the thrust is negative: a mean over them is no number."""
+    case = load_scenario(new(tmp_path / "trial", kind="asv").files[0])
+    model = case.vessel.model
+    wide = replace(model, parameter_std=20.0 * model.parameter_std)
+    case = replace(case, vessel=replace(case.vessel, model=wide))
+    for seed in range(4):
+        legs = legs_for_most(case, np.random.default_rng(seed))
+        assert 0.0 < legs.transit_speed_mps < np.inf
+        assert 0.0 < legs.turning_radius_m < np.inf
+    unbounded = replace(case, vessel=replace(case.vessel, model=replace(wide, parameter_range={})))
+    with pytest.raises(NoAnswer, match="make no way"):
+        legs_for_most(unbounded, np.random.default_rng(0))
 
 
 @pytest.mark.thorough

@@ -73,7 +73,7 @@ def calibration(case: Scenario, *, seed: int) -> Scenario:
     """The scenario with each run cut to the time in which ships of the prior keep near its planned track.
 
     Raises:
-        NoAnswer: no run is safe for so long that it tells anything.
+        NoAnswer: no run is safe for so long that it tells anything, or too many ships of the prior make no way.
     """
     rng = np.random.default_rng((seed, len(case.dictionary)))
     plan = legs_for_most(case, rng)
@@ -105,6 +105,9 @@ def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     The speed is that of full ahead on a straight course, or of the fastest run; the radius that of the helm as far over
     as legs use it. Where that radius is too wide, legs are as much slower as makes it tighter: thrust turns a slow ship
     on a tighter circle, a rudder hardly does. Where the file states a slower speed or a wider radius, that stays.
+
+    Raises:
+        NoAnswer: too many ships of the prior make no way at all.
     """
     vessel, plan = case.vessel, case.plan
     fastest_run = max((speed for spec in case.dictionary for speed in _speeds(spec).values()), default=np.inf)
@@ -116,9 +119,15 @@ def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     ahead = approach.helm.inputs(1.0, approach.angle_rad)
     surge, _, _ = vessel.model.accelerations((speeds, 0.0, 0.0), (speeds, 0.0), ahead, parameters=drawn.T)
     fastest = float(np.quantile(speeds[np.maximum((surge > 0.0).sum(axis=0) - 1, 0), 0], 1.0 - ABLE))
+    if fastest == 0.0:
+        raise NoAnswer(
+            f"{1 - ABLE:.0%} or more of the ships of the prior make no way with their engines full ahead: state less "
+            "uncertainty of the parameters, or their ranges"
+        )
     usual, widest_m = min(ship.transit_speed_mps, USABLE_SHARE * fastest, fastest_run), WIDEST * vessel.length_m
-    radii_m = {
-        share * usual: float(np.quantile(_turning_radii_m(approach, share * usual, drawn), ABLE)) for share in SLOWER
+    radii_m = {  # that of a ship, as there is no mean with one that never turns
+        share * usual: float(np.quantile(_turning_radii_m(approach, share * usual, drawn), ABLE, method="inverted_cdf"))
+        for share in SLOWER
     }
     tight_m = max(widest_m, min(radii_m.values()) / NEARLY)
     speed, radius_m = next((speed, radius_m) for speed, radius_m in radii_m.items() if radius_m <= tight_m)
