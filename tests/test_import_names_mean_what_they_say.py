@@ -83,6 +83,17 @@ def test_what_is_in_the_unit_of_another_quantity_is_no_order_or_position(unit: s
             assert not marked(named(f"thruster_{unit}")).column
 
 
+@pytest.mark.parametrize("name", ["tau_x_N", "tau_psi_Nm", "tau_x [kN]", "Fx_N", "Fx [N]", "X_N"])
+def test_a_generalised_force_in_newtons_is_no_shaft_speed(name: str) -> None:
+    assert not marked(named(name)).column
+
+
+@pytest.mark.parametrize("name", ["SOG [kN]", "sog_kN", "Depth (pressure sensor) [m]", "Pressure depth [m]"])
+def test_a_unit_of_the_reading_itself_says_what_it_is(name: str) -> None:
+    """Knots are written kN, too, and a depth in metres is one whatever measures it."""
+    assert marked(named(name)).column == ("depth_m" if "epth" in name else "sog_mps")
+
+
 @pytest.mark.parametrize("unit", ["deg", "rad", "%", "rpm", "1/min", "PS", "Hz", "A", "N"])
 def test_units_and_sides_of_orders_stay(unit: str) -> None:
     kind = {"deg": "Rudder", "rad": "Azimuth", "PS": "Rudder", "A": "Rudder"}.get(unit, "Engine order")

@@ -105,7 +105,7 @@ FOREIGN = (
     "MPa", "C", "°C", "degC", "K", "l/h", "kg/h", "t/h", "m3/h",
 )  # fmt: skip
 """Units of forces, torques, powers and other quantities beside an actuator, which are no order or position of it."""
-FORCE = r"\b(thrust|force|pull|push)\b"
+FORCE = r"\b(thrust|force|pull|push|tau|f?[xy])\b"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,19 +168,21 @@ def marked(channel: Channel) -> Mark:
         column, rank = _coordinate(name, channel.values), 4
     if not _fits(column, unit_word(unit)) or (column not in ACTUATORS and re.search(ORDER, name)):
         column = ""  # an order of a heading or a speed is no reading of it
-    if column and _is_foreign(plain, channel.unit, whole, actuator=column in ACTUATORS):
+    if column and _is_foreign(plain, channel.unit, whole, column=column):
         column = ""
     if column in BESIDE and np.ptp(channel.values) == 0:
         column = ""
     return Mark(column=column, rank=rank, unit=unit_word(unit), name=name, sense=sense if column in SIDED else 0.0)
 
 
-def _is_foreign(name: str, unit: str, in_words: str, *, actuator: bool) -> bool:
+def _is_foreign(name: str, unit: str, in_words: str, *, column: str) -> bool:
     """Whether a channel is in the unit of a quantity that is not read, or named after one."""
+    found = re.search(r"(?:[\[({]\s*([^\])}]*?)\s*[\])}]|[_\s,/]([A-Za-z°]+))\s*$", name)
+    stated, actuator = unit or (found[1] or found[2] if found else ""), column in ACTUATORS
+    if not actuator and unit_word(stated) in FACTORS[dimension(column)]:
+        return False  # SOG [kN] is in knots, and a depth in metres is one, though a pressure sensor gives it
     if re.search(r"\b(torque|force|power(?! lever)|pressure|temperature|current|voltage)\b", in_words):
         return True
-    found = re.search(r"(?:[\[({]\s*([^\])}]*?)\s*[\])}]|[_\s,/]([A-Za-z°]+))\s*$", name)
-    stated = unit or (found[1] or found[2] if found else "")
     if len(stated) == 1 and not (unit or name.rstrip().endswith("]") or re.search(FORCE, in_words)):
         return False  # engine_N is a speed, Rudder (A) the first of two
     return stated in FOREIGN and (actuator or stated != "N")  # lat [N]
