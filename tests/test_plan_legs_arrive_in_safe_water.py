@@ -9,9 +9,11 @@ import shapely
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.goal_distance import clearance_field
 from expdesign.plan.control.ships import capability
-from expdesign.plan.legs import LegTask, LegWater, _ompl, agile, agile_leg, dubins
+from expdesign.plan.legs import LegTask, LegWater, _ompl, agile, agile_leg, dubins, optimise
 from expdesign.plan.legs._ompl import SEARCH_BATCHES, dubins_curve, search_dubins
 from expdesign.plan.legs.dubins import find_path
+from expdesign.plan.legs.optimise import solve_leg
+from expdesign.plan.legs.problem import leg_problem
 from expdesign.plan.legs.water import nearest_turns
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
@@ -49,6 +51,41 @@ def test_a_path_round_a_wall_is_found_and_its_hull_is_clear():
     assert shapely.contains_properly(water.safe, swept_area(path, water.vessel.hull_b))
     shortest = 2 * np.hypot(100 + 20, 150 - 20) + 2 * 20  # taut string round the wall's end at the clearance
     assert shortest < length(path) < 1.4 * shortest
+
+
+def test_a_leg_that_is_too_fast_between_nodes_is_sought_slower_at_them(monkeypatch):
+    """The solver gives the ship 3 % more speed between nodes than it was asked to allow at them."""
+    water = leg_water(OPEN)
+    orders = np.linspace(0.5, 4.0, 15)
+    begin = at_rest(0, 0, 0.0)
+
+    def steady(n: float) -> np.ndarray:
+        return np.tile([n, 0.0, n, 0.0], (1500, 1))
+
+    speeds = [water.states(begin, steady(n), None)[-1, 3] for n in orders]
+    asked = []
+
+    def solved(problem):
+        asked.append(problem.top_speed_mps)
+        return steady(float(np.interp(1.03 * problem.top_speed_mps, speeds, orders))), 0.0
+
+    monkeypatch.setattr(optimise, "_solved", solved)
+    path = np.column_stack([np.linspace(0.0, 100.0, 9), np.zeros((9, 2))])
+    problem = leg_problem(
+        task(begin, at_rest(100, 0, 0.0)),
+        water,
+        end=at_rest(100, 0, 0.0),
+        states=np.column_stack([path, np.zeros((9, 3))]),
+        inputs=np.zeros((9, 4)),
+        path=path,
+        duration_s=100.0,
+        turning_rate_radps=0.1,
+    )
+    problem = replace(problem, top_speed_mps=0.8)
+    values = solve_leg(problem, water)
+    assert values is not None
+    assert len(asked) == 2
+    assert water.states(begin, values, None)[:, 3].max() <= 1.005 * problem.top_speed_mps
 
 
 def test_a_path_to_a_place_without_room_is_not_searched_for(monkeypatch):
@@ -107,7 +144,7 @@ def test_commands_take_the_vessel_to_the_desired_state_within_limits_and_rates(s
 @pytest.mark.thorough
 def test_a_leg_without_a_solution_in_its_corridor_is_found_where_the_whole_water_holds_one(monkeypatch):
     solved = agile.solve_leg
-    monkeypatch.setattr(agile, "solve_leg", lambda problem: None if problem.bounded else solved(problem))
+    monkeypatch.setattr(agile, "solve_leg", lambda problem, water: None if problem.bounded else solved(problem, water))
     channel, parted = leg_water(shapely.box(-60, -350, 60, 350)), leg_water(BASIN.difference(WALL))
     for water, begin, end in (
         (channel, at_rest(-40, 0, 0.0), at_rest(60, 0, 0.4)),

@@ -185,7 +185,7 @@ def _optimised(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> A
     """The fastest leg in the water beside a line; where there is none, one that the whole water happens to hold."""
     problems = list(_problems(task, water, ship, line))
     for problem in (*problems, *(_unbounded(problem) for problem in problems if problem.bounded)):
-        values = solve_leg(problem)
+        values = solve_leg(problem, water)
         if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
             return values
     return None

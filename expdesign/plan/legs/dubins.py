@@ -30,7 +30,7 @@ def curved_leg(task: LegTask, water: LegWater) -> FoundLeg | None:
             room_port_m=narrowing * wide.room_port_m,
             room_starboard_m=narrowing * wide.room_starboard_m,
         )
-        values = solve_leg(problem)
+        values = solve_leg(problem, water)
         if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
             return FoundLeg(commands=values, source=path.source)
     return None

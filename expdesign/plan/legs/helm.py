@@ -86,9 +86,9 @@ def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: R
     if transit is None:
         problem = _problem(task, water, ship, check, path, share)
         doubtful = problem.guesses == 1 and task.budget.spent_s > 0.0  # one such attempt on a leg is enough
-        return None if doubtful else solve_leg(problem)
+        return None if doubtful else solve_leg(problem, water)
     begin = replace(task, end=transit.start, end_inputs=ship.approach.inputs)
-    before = solve_leg(_problem(begin, water, ship, check, transit.to, share))
+    before = solve_leg(_problem(begin, water, ship, check, transit.to, share), water)
     held = None if before is None else transit.held(task, before, water, ship)
     if before is None or held is None:
         return None
@@ -96,7 +96,7 @@ def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: R
     past = water.remembered(np.concatenate([task.past, before, commands]))
     rest = replace(task, start=state, start_inputs=past[-1], before=past)
     at_once = Recovery(states=state[None], commands=np.empty((0, len(past[-1]))))
-    after = solve_leg(_problem(rest, water, ship, at_once, transit.on_from(state), share))
+    after = solve_leg(_problem(rest, water, ship, at_once, transit.on_from(state), share), water)
     return None if after is None else np.concatenate([before, commands, after])
 
 

@@ -10,10 +10,12 @@ import numpy as np
 from expdesign.memory import recalled
 from expdesign.plan.legs._casadi import FREE_SAMPLES, program
 from expdesign.plan.legs.problem import LegProblem
-from expdesign.plan.legs.water import nearest_turns
+from expdesign.plan.legs.water import LegWater, nearest_turns, through_water
 from expdesign.values import Array
 
 NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)  # numbers of nodes tried while the time is free
+# legs may be faster between nodes than at them by this factor; else they are sought again so many times, slower at them
+FASTER, SLOWED = 1.009, 2
 UNLIMITED = 0.999  # share of the largest from which on a transition would last for ever
 
 
@@ -52,15 +54,34 @@ def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
     return nodes, max(1, round(duration_s / (nodes * sample_s)))
 
 
-def solve_leg(problem: LegProblem) -> Array | None:
+def solve_leg(problem: LegProblem, water: LegWater) -> Array | None:
     """Commands (k, m) at the vessel's sample time, or None when IPOPT finds none.
 
     First the fastest motion is sought with the sample time free, then the smoothest one on whole samples in that
-    time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. The answer is
-    for the caller to check by simulation.
+    time. Where commands that would give the guessed motion lead nowhere, evenly changing ones often do. Speed is
+    limited at the nodes; where the ship is faster between them, slower nodes are sought. The answer is for the caller
+    to check by simulation.
     """
     values, problem.budget.spent_s = recalled(_solved, problem)
+    for _ in range(SLOWED):
+        if values is None:
+            break
+        states = water.states(problem.start, values, problem.past)
+        if (faster := _fastest_mps(water, states) / problem.top_speed_mps) <= FASTER:
+            break
+        inputs = np.vstack([problem.start_inputs, values])
+        slow = replace(problem, states=states, inputs=inputs, duration_s=len(values) * problem.vessel.sample_time_s)
+        slow = replace(slow, top_speed_mps=problem.top_speed_mps / faster)
+        slower, problem.budget.spent_s = recalled(_solved, slow)
+        if slower is None:
+            break
+        values = slower
     return values
+
+
+def _fastest_mps(water: LegWater, states: Array) -> float:
+    """Largest speed through water of states (k, 6)."""
+    return float(np.hypot(*through_water(water.environment, states)[:, :2].T).max())
 
 
 def _solved(problem: LegProblem) -> tuple[Array | None, float]:

@@ -286,9 +286,9 @@ def last_state(track: Trajectory) -> Array:
 
 
 def through_water(environment: Environment, state: Array) -> Array:
-    """(3,) velocity through water of a state (6,), whose velocity is over ground."""
-    u_c, v_c = to_body(environment.current_to, state[2], NUMPY)
-    return np.asarray(state[3:] - np.array([u_c, v_c, 0.0]))
+    """(..., 3) velocity through water of states (..., 6), whose velocity is over ground."""
+    u_c, v_c = to_body(environment.current_to, state[..., 2], NUMPY)
+    return np.asarray(state[..., 3:] - np.stack([u_c, v_c, np.zeros_like(u_c)], axis=-1))
 
 
 def acceptable(start: Array, end: Array, water: LegWater, values: Array, before: Array) -> bool:
