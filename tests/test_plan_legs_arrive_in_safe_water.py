@@ -56,11 +56,11 @@ def test_a_path_round_a_wall_is_found_and_its_hull_is_clear():
 def test_a_leg_that_is_too_fast_between_nodes_is_sought_slower_at_them(monkeypatch):
     """The solver gives the ship 3 % more speed between nodes than it was asked to allow at them."""
     water = leg_water(OPEN)
-    orders = np.linspace(0.5, 4.0, 15)
+    orders = np.linspace(1.0, 14.0, 14)
     begin = at_rest(0, 0, 0.0)
 
     def steady(n: float) -> np.ndarray:
-        return np.tile([n, 0.0, n, 0.0], (1500, 1))
+        return np.tile([n, 0.0, n, 0.0], (300, 1))
 
     speeds = [water.states(begin, steady(n), None)[-1, 3] for n in orders]
     asked = []
@@ -81,7 +81,6 @@ def test_a_leg_that_is_too_fast_between_nodes_is_sought_slower_at_them(monkeypat
         duration_s=100.0,
         turning_rate_radps=0.1,
     )
-    problem = replace(problem, top_speed_mps=0.8)
     values = solve_leg(problem, water)
     assert values is not None
     assert len(asked) == 2
