@@ -31,7 +31,7 @@ FLOORS = {
         ("web",),
         ("cli", "__main__"),
     ),
-    "records": (("file",), ("pose",), ("load", "pieces")),
+    "records": (("file",), ("limits", "pose"), ("load", "pieces")),
     "step_trials": (
         ("holds", "responses"),
         ("steady_state", "noise"),

@@ -10,8 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.export.monitor_content import MonitorContent, monitor_json, sentences
+from expdesign.export.monitor_content import MonitorContent
 from expdesign.export.monitor_page import MOST_LINEAR, monitor_document, statistic_figure
+from expdesign.export.monitor_results import monitor_json
+from expdesign.export.monitor_verdict import sentences
 from expdesign.export.pages import document_html
 from expdesign.export.pages.figures import report_style
 from expdesign.monitoring import (

@@ -8,7 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from expdesign.export.monitor_content import MonitorContent, monitor_json, sentences
+from expdesign.export.monitor_content import MonitorContent
+from expdesign.export.monitor_results import monitor_json
+from expdesign.export.monitor_verdict import sentences
 from expdesign.monitoring import Calibration, State, calibrate, threshold
 from expdesign.saved import restored, saved
 from monitoring_case import CHANGES, STRETCH_S, content_of, drawn_columns, drawn_grams, grams_from, watched

@@ -9,7 +9,9 @@ import numpy as np
 
 from expdesign.export.document import Document, Figure, Table, section
 from expdesign.export.files import finite
-from expdesign.export.monitor_content import MonitorContent, monitor_header, monitor_rows, sentences
+from expdesign.export.monitor_content import MonitorContent
+from expdesign.export.monitor_results import monitor_header, monitor_rows
+from expdesign.export.monitor_verdict import sentences
 from expdesign.export.pages.figures import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, page_figure, plain, svg
 from expdesign.export.words import HOUR, SINCE_1970_S, hours, when
 from expdesign.monitoring import KINDS, TOLD_APART, soonest

@@ -18,6 +18,7 @@ are ignored and noted. Every error is a `FileError` with the rows concerned.
 """
 
 from expdesign.records.file import COLUMNS
+from expdesign.records.limits import check_limits, column_limits
 from expdesign.records.load import load_records, read_levels, row_labels
 from expdesign.records.pieces import STREAM, Piece, Taken, as_file, pieces
 from expdesign.records.pose import (

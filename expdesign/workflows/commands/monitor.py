@@ -15,8 +15,9 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import InputError, NotInformative
 from expdesign.export.folder import Content, write_files
-from expdesign.export.monitor_content import MonitorContent, monitor_json
+from expdesign.export.monitor_content import MonitorContent
 from expdesign.export.monitor_page import budget_entries, monitor_document
+from expdesign.export.monitor_results import monitor_json
 from expdesign.export.pages import document_html
 from expdesign.export.words import counted
 from expdesign.monitoring import RollWatch

@@ -27,9 +27,8 @@ from expdesign.export.step_trial_page import (
     to_do_table,
 )
 from expdesign.progress import Progress, silent
-from expdesign.records import STREAM, Piece, Taken, pieces
+from expdesign.records import STREAM, Piece, Taken, check_limits, column_limits, pieces
 from expdesign.records.file import Inputs, Table, choose_columns
-from expdesign.records.load import check_limits, column_limits
 from expdesign.requests import repeating
 from expdesign.saved import restored, saved
 from expdesign.step_trials import controls_of
