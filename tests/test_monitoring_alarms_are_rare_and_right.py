@@ -404,6 +404,32 @@ def test_another_load_is_told_as_one_cause_where_it_explains_more_than_a_change(
     assert ("another load, mass" in told) == ("another load, mass" in page) == alike
 
 
+@pytest.fixture(scope="module")
+def alarmed(loaded: Calibration) -> MonitorContent:
+    """After an alarm of parameter p2, which may be one of three that another load changes alike."""
+    told = next(content for name, content in states(loaded) if name == "alarm")
+    return replace(told, calibration=replace(loaded, heavier=np.array([1.0, 1.0, 1.0, 0.0])))
+
+
+@pytest.mark.parametrize("push", [-1.0, 1.5 * AS_LIKELY, 4.0 * AS_LIKELY])
+@pytest.mark.parametrize("load", [-1.0, 1.5 * AS_LIKELY, 4.0 * AS_LIKELY])
+def test_causes_of_an_alarm_are_told_in_the_order_of_how_well_they_explain_it(
+    alarmed: MonitorContent, load: float, push: float
+) -> None:
+    """A push that explains the data better than the change was told first, before a load that explains them best."""
+    alarm = replace(alarmed.found[-1], loaded=(load, 1.0, 0.1), pushes=((2, push),))
+    content = replace(alarmed, alarms=(alarm,), state=replace(alarmed.state, alarm=None))
+    told = next(text for text in sentences(content) if text.startswith("Since "))
+    gains = {"parameter p2 by": 0.0, "another load, mass": load, "a steady push": push}
+    places = sorted(gains, key=told.index)
+    best = gains[places[0]]
+    for words, gain in gains.items():
+        assert best > gain - AS_LIKELY  # none is clearly better than the first
+        less = told[: told.index(words)].endswith("or, explaining the data less well, ")
+        assert less == (gain <= best - AS_LIKELY)
+    assert ("the weather or the ship has changed" in told) == (places[0] == "a steady push")
+
+
 @pytest.mark.usefixtures("undrawn_here")
 def test_the_ship_has_changed_only_by_an_alarm_and_the_same_only_where_nothing_else_is_said(
     loaded: Calibration,

@@ -178,12 +178,9 @@ def few(names: Sequence[str]) -> str:
     return f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} more"
 
 
-def load_in_words(content: MonitorContent, alarm: Alarm) -> str:
-    """Another load that explains an alarm's data as well as its change, in words; nothing where there is none."""
-    if alarm.loaded is None:
-        return ""
+def _load_in_words(content: MonitorContent, value: float, std: float) -> str:
+    """Another load, of a size with its standard error."""
     change = content.changes[int(np.argmax(content.calibration.heavier))]
-    _, value, std = alarm.loaded
     return f"another load, mass and inertia by {change.in_words(value * change.size, std * change.size)}"
 
 
@@ -192,34 +189,38 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     statistic, limit = told_apart(alarm.statistic, content.limit)
     whose = "a sensor" if change.effect == GYRO else "the ship"
     own, who = f"{change.words} by {size_in_words(content, alarm)}", f"{whose} has changed"
-    by_load = max(alarm.loaded[0], 0.0) if alarm.loaded else 0.0  # log-likelihood over that of the change
-    likelier = by_load > AS_LIKELY
-    if load := load_in_words(content, alarm):
-        own = (
-            f"{load}, or, explaining the data less well, {own}"
-            if likelier
-            else f"{own}, or {load}, which explains the data as well"
-        )
+    push = f"a steady push in {' or '.join(pushed(content, alarm))} by wind or current"
+    gains = {own: 0.0}  # possible cause -> its log-likelihood over that of the change
+    if alarm.loaded:
+        gain, value, std = alarm.loaded
+        gains[_load_in_words(content, value, std)] = gain
+    if alarm.pushes:
+        gains[push] = max(gain for _, gain in alarm.pushes)
+    if max(gains.values()) > AS_LIKELY:
+        gains = dict(sorted(gains.items(), key=lambda one: -one[1]))
+    first, *others = gains
     if _may_be_wind(content, alarm):
         who += ", or the wind, which is not measured"
     if alarm.pushes:
-        push = f"a steady push in {' or '.join(pushed(content, alarm))} by wind or current"
-        if pushed(content, alarm, beyond=AS_LIKELY):
-            own, who = f"{push}, or, explaining the data less well, {own}", f"the weather or {whose} has changed"
-        else:
-            own, who = f"{own}, or {push}, which explains the data as well", f"{whose} or the weather has changed"
+        who = f"the weather or {whose} has changed" if first == push else f"{whose} or the weather has changed"
+    causes = first
+    for other in others:
+        alike = gains[other] > gains[first] - AS_LIKELY
+        causes += f", or {other}, which explains the data as well" * alike
+        causes += f", or, explaining the data less well, {other}" * (not alike)
     text = (
-        f"Since {when(alarm.since_s)} {who}: {own}. The alarm came at {when(alarm.time_s)}, with the statistic "
+        f"Since {when(alarm.since_s)} {who}: {causes}. The alarm came at {when(alarm.time_s)}, with the statistic "
         f"{statistic} above the threshold {limit}."
     )
-    if alarm.as_likely and not likelier:
-        others = few([content.changes[number].words for number in alarm.as_likely])
-        text += f" The data are explained as well by: {others}."
+    if alarm.as_likely and first == own:
+        names = few([content.changes[number].words for number in alarm.as_likely])
+        text += f" The data are explained as well by: {names}."
+    by_load = max(alarm.loaded[0], 0.0) if alarm.loaded else 0.0
     if alarm.unexplained - by_load > content.limit:
-        more, causes = ("another load", "") if likelier else ("this one change", "another load, ")
+        more, load = ("another load", "") if by_load > AS_LIKELY else ("this one change", "another load, ")
         text += (
             f" More than {more} is needed to explain them: one cause may change several parameters at once, as "
-            f"{causes}shallow water and weather beyond the reference do."
+            f"{load}shallow water and weather beyond the reference do."
         )
     if not alarm.settled:
         text += " The size is not yet settled."
