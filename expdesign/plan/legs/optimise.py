@@ -63,15 +63,17 @@ def solve_leg(problem: LegProblem, water: LegWater) -> Array | None:
     to check by simulation.
     """
     values, problem.budget.spent_s = recalled(_solved, problem)
+    limit_mps = problem.top_speed_mps  # at the nodes
     for _ in range(SLOWED):
         if values is None:
             break
         states = water.states(problem.start, values, problem.past)
         if (faster := _fastest_mps(water, states) / problem.top_speed_mps) <= FASTER:
             break
+        limit_mps /= faster
         inputs = np.vstack([problem.start_inputs, values])
         slow = replace(problem, states=states, inputs=inputs, duration_s=len(values) * problem.vessel.sample_time_s)
-        slow = replace(slow, top_speed_mps=problem.top_speed_mps / faster)
+        slow = replace(slow, top_speed_mps=limit_mps)
         slower, problem.budget.spent_s = recalled(_solved, slow)
         if slower is None:
             break
