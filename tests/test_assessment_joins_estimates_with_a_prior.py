@@ -1,5 +1,6 @@
 """Estimates joined with what was known before: the information of both adds up, and a contradiction is told."""
 
+import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from expdesign.export.files import vessel_toml
 from expdesign.records import load_records
 from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
-from expdesign.signals import Commands
+from expdesign.signals import Batch, Commands, Record
 from expdesign.vessel import Term, VesselModel
 from measured_trials import held, write_run
 from synthetic_ship import sail, trial, vessel_file, write
@@ -97,6 +98,26 @@ def test_a_parameter_without_standard_deviation_keeps_its_value() -> None:
     after = with_prior(found(0), known([0.0, 1.0]))
     assert after.values[0] == pytest.approx(0.3, abs=1e-12)
     assert after.covariance[0, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_estimate_without_a_prior_needs_ten_samples_more_than_an_equation_has_parameters() -> None:
+    """Fewer do not show their own errors; a prior states them."""
+    vessel, rng = load_vessel(TWIN_SCREW), np.random.default_rng(0)
+    counts = [sum(term.equation == equation for term in vessel.model.terms) for equation in "uvr"]
+    need, steps = max(counts) + 10, range(-2, 3)
+    refused = []
+    for prior, more in itertools.product(("none", "parameter_std"), steps):
+        shape = (need + more, len(vessel.model.inputs))
+        batch = Batch(
+            name="run", sample_time_s=vessel.sample_time_s, input_names=vessel.model.inputs,
+            inputs=rng.uniform(0.1, 1.0, shape), velocity=rng.normal([2.0, 0.0, 0.0], 0.05, (need + more, 3)),
+        )  # fmt: skip
+        try:
+            assess(vessel, Record(batches=(batch,)), EstimateOptions(methods=("ls",), prior=prior))
+        except NotInformative as error:
+            if "or more: fewer do not show" in str(error):
+                refused.append((prior, more))
+    assert refused == [("none", -2), ("none", -1)]
 
 
 def test_a_contradiction_is_told_and_agreement_is_not() -> None:
