@@ -1,5 +1,9 @@
 """The desired motion of each family has its settings; contradictory settings are refused in one line."""
 
+import pickle
+from dataclasses import replace
+
+import cloudpickle
 import numpy as np
 import pytest
 
@@ -188,3 +192,12 @@ def test_runs_that_cannot_be_are_refused_in_one_line(name: str, settings: dict, 
 def test_an_unknown_family_is_answered_with_the_nearest():
     with pytest.raises(UnknownName, match="'zig_zag', did you mean 'zigzag'"):
         family("zig_zag")
+
+
+@pytest.mark.parametrize("one", FAMILIES, ids=lambda one: one.name)
+def test_every_family_is_the_same_in_another_process_and_in_remembered_results(one):
+    """By the standard library, which results are kept with, and as tasks are sent."""
+    assert pickle.loads(pickle.dumps(one)) is one
+    assert pickle.loads(cloudpickle.dumps(one)) is one
+    other = replace(one, summary="another")
+    assert pickle.loads(cloudpickle.dumps(other)).summary == "another"

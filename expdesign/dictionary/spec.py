@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, SupportsIndex
 
 import numpy as np
 
@@ -96,23 +98,27 @@ class Family:
     # whether its commands depend on the simulated motion; its candidates are simulated one by one
     closed_loop: bool = False
 
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        """Pickled by the name under which a module holds it: its function is not there any more."""
+        held = getattr(sys.modules.get(self.__module__), self.name, None) is self
+        return self.name if held else super().__reduce_ex__(protocol)
+
 
 def motion_family(*settings: Setting) -> Callable[[Reference], Family]:
     """Makes a family of the function that states its velocities: its name, and its docstring as the summary."""
-    return lambda function: Family(
-        name=function.__name__, summary=_summary(function), settings=settings, reference=function
-    )
+    return lambda function: _of(function, settings=settings, reference=function)
 
 
 def order_family(*settings: Setting, closed_loop: bool = False) -> Callable[[Orders], Family]:
     """Makes a family of the function that states its commands, as `motion_family` does of velocities."""
-    return lambda function: Family(
-        name=function.__name__,
-        summary=_summary(function),
-        settings=settings,
-        orders=function,
-        closed_loop=closed_loop,
-    )
+    return lambda function: _of(function, settings=settings, orders=function, closed_loop=closed_loop)
+
+
+def _of(function: Callable[..., object], **parts: Any) -> Family:
+    """A family that stands in its module under the name of its function."""
+    made = Family(name=function.__name__, summary=_summary(function), **parts)
+    object.__setattr__(made, "__module__", function.__module__)
+    return made
 
 
 def _summary(function: Callable[..., object]) -> str:
