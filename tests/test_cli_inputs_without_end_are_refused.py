@@ -114,7 +114,7 @@ def test_a_route_of_very_many_waypoints_is_checked_in_linear_time() -> None:
             group.remove(element)
     for number in range(30_000):
         point = etree.SubElement(waypoints, f"{space}waypoint", id=str(min(number, 29_998)), revision="0")
-        etree.SubElement(point, f"{space}position", lat="60.0", lon="24.0")
+        etree.SubElement(point, f"{space}position", lat=f"{60.0 + 1e-4 * number:.4f}", lon="24.0")
         etree.SubElement(manual, f"{space}scheduleElement", waypointId=str(min(number, 29_998)))
     size, *problems = check_rtz(etree.tostring(root), "route")
     assert "bytes, expected less than" in size
