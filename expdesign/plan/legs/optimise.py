@@ -14,7 +14,7 @@ from expdesign.plan.legs.water import LegWater, nearest_turns, through_water
 from expdesign.values import Array
 
 NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)  # numbers of nodes tried while the time is free
-# legs may be faster between nodes than at them by this factor, else they are sought again so many times, slower at them;
+# legs may be faster between nodes than at them by this factor, else they are sought again so many times, slower there;
 # with `BEYOND_ENDS` at nodes that is within the 3 % that verification allows beyond a leg's faster end
 FASTER, SLOWED = 1.009, 2
 UNLIMITED = 0.999  # share of the largest from which on a transition would last for ever
